@@ -100,11 +100,11 @@ class SimulatedVehicle:
         )
         self._tuned_at = 0
 
-    def begin_in_flight(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
-        """Instead of on the ground: in HOLD, nose ahead, steadily on the way to a place far ahead."""
+    def begin_in_flight(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float | None = None) -> None:
+        """Instead of on the ground: in HOLD, nose ahead or as said, steadily on the way to a place far ahead."""
         north, east, down = position_ned_m
         v_north, v_east, v_down = velocity_ned_m_s
-        yaw_rad = math.atan2(v_east, v_north)
+        yaw_rad = math.atan2(v_east, v_north) if yaw_rad is None else yaw_rad
         self._plant.cruise(position_ned_m, velocity_ned_m_s, yaw_rad)
         steady = TrajectorySetpoint(position_ned_m, velocity_ned_m_s, yaw_rad=yaw_rad)
         sample = self._plant.step(steady, armed=True)

@@ -8,20 +8,17 @@ import pytest
 
 from bench.cases.hits import draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
-from bench.fly.wire import ASKED_HZ, VehicleRecording, fly_hit, heard, streams_asked_hz
+from bench.fly.wire import ASKED_HZ, fly_hit
 from bench.main import main
 from bench.studies.detection.detectors import first_possible, samples_late
 from bench.studies.detection.flights import Event, events, mistakes
-from companion.mavlink.decode import Decoder
-from companion.messages import Attitude, AttitudeTarget, ExtendedState, ImuSample, LandedState, LocalPosition, Sample
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 from companion.motion.vector import plus
 from companion.reflex.detection.detector import ImpactKind, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
 from rebound_cli.replay.report import replay_log
-from sim_vehicle.plant.plant import Plant
 from tests.rebound_cli.replay.flying import HIT_US, flight
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
 TICK_US, PUSHED_US, HOVER = 4_000, 4_000_000, 0.7
 
@@ -93,81 +90,42 @@ def test_a_force_is_a_hit_from_its_threshold_on(detector, push, seen):
     assert len(fly(detector, push)) == seen
 
 
-@pytest.mark.parametrize("rate", ASKED_HZ)
-def test_the_samples_of_a_recording_are_those_of_the_whole_vehicle(rate, monkeypatch):
-    # Given a vehicle that takes off, whose link was asked for the bench's rates before anything else
-    recording, seed = VehicleRecording(), 11 + rate
-    step = Plant.step
-
-    def recorded_step(plant, setpoint, armed):
-        output = step(plant, setpoint, armed)
-        recording.add(plant, output, Situation(), 1.0)
-        return output
-
-    monkeypatch.setattr(Plant, "step", recorded_step)
-    # Another plant stands on the ground before there is a vehicle.
-    monkeypatch.setattr("sim_vehicle.vehicle.check_start", lambda *_: None)
-    client = Client(seed)
-    asked_hz = streams_asked_hz(rate)
-    for message, hz in asked_hz.items():
-        client.command(SET_INTERVAL, message, 1e6 / hz)
-    client.run(0.2)
-    client.command(TAKEOFF)
-    client.command(ARM_DISARM, 1)
-    client.run(6.0)
-    assert client.position()[2] < -1.5
-    # When its packets are decoded as the companion does it
-    decoder = Decoder()
-    decoder.listen_to(1, 1)
-    made = [sample for step in heard(recording, asked_hz, seed) for sample in step.samples]
-    kinds = {type(sample) for sample in made}
-    decoded = [sample for raw in client.packets for _, sample in decoder.feed(raw) if type(sample) in kinds]
-    # Then they are, bit by bit and in this order, what the bench makes of the recording
-    # A receiver shows no hit: no detector hears it.
-    assert len(made) > 6 * rate and len(kinds) == len(asked_hz) - 1
-    # The bench's flights know their own landed state; here it is only when it comes that counts.
-    pairs = zip(decoded, made, strict=True)
-    assert [(a, b) for a, b in pairs if a != b and not type(a) is type(b) is ExtendedState] == []
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_a_hit_is_the_one_that_was_asked_for(seed):
     # Given any approach
     case = draw_case(seed, False)
     airframe = vehicle_of_hit(case).airframe
     # When it is flown
-    recording, hit = fly_hit(case, airframe)
+    flown = fly_hit(case, airframe)
     # Then the vehicle touches at the speed asked for, moving towards the obstacle
-    speed_m_s = sum(v * v for v in hit.impact_velocity_ned_m_s) ** 0.5
+    speed_m_s = sum(v * v for v in flown.hit.impact_velocity_ned_m_s) ** 0.5
     assert speed_m_s == pytest.approx(case.speed_m_s, rel=0.1, abs=0.1)
     # And the recorded contact force adds up to the hit's impulse, and there is none before it
-    before = [
-        force
-        for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
-        if sample.time_boot_us < hit.contact_at_boot_us
-    ]
+    before = [force for time_us, force in flown.contact_m_s2.items() if time_us < flown.hit.contact_at_boot_us]
     assert before and not any(before)
-    total_m_s = sum(recording.contact_m_s2) * 1e-6 * airframe.imu.integration_interval_us
-    assert total_m_s >= 0.95 * sum(j * j for j in hit.impulse_ned_n_s) ** 0.5 / airframe.mass_kg
+    total_m_s = sum(flown.contact_m_s2.values()) * 1e-6 * airframe.imu.integration_interval_us
+    assert total_m_s >= 0.95 * sum(j * j for j in flown.hit.impulse_ned_n_s) ** 0.5 / airframe.mass_kg
 
 
 def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     # Given a hit, heard at every rate
     case = draw_case(0, False)
-    recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
-    first_us = {}
-    for rate in ASKED_HZ:
-        arrived = heard(recording, streams_asked_hz(rate), case.seed)
-        first_us[rate], times_us = first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1.5)
+    flown = fly_hit(case, vehicle_of_hit(case).airframe)
+    touch_us, first_us = flown.hit.contact_at_boot_us, {}
+    for rate, arrived in flown.heard.items():
+        first_us[rate], times_us = first_possible(flown.contact_m_s2, arrived, touch_us, floor_m_s2=1.5)
         # Then the report that came with it was not late, and one with the next sample was late by one
         after_us = next(time_us for time_us in times_us if time_us > first_us[rate])
         late = [samples_late(at_us, first_us[rate], times_us) for at_us in (first_us[rate], after_us)]
-        assert late == [0, 1] and first_us[rate] > hit.contact_at_boot_us
+        assert late == [0, 1] and first_us[rate] > touch_us
+        # and each rate is the one that a client of PX4 receives
+        flown_s = 1e-6 * (times_us[-1] - times_us[0])
+        assert (len(times_us) - 1) / flown_s == pytest.approx(rate, rel=0.03)
     # And slower streams show it later or at the same time, up to an interval of the stream
-    assert first_us[246] - hit.contact_at_boot_us <= 8_000
-    assert first_us[50] - hit.contact_at_boot_us <= 24_000
+    assert first_us[246] - touch_us <= 8_000
+    assert first_us[50] - touch_us <= 24_000
     # And where no force reaches the floor, the hit fell between the samples
-    assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6)[0] is None
+    assert first_possible(flown.contact_m_s2, arrived, touch_us, floor_m_s2=1e6)[0] is None
 
 
 @pytest.mark.slow

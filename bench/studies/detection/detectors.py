@@ -2,7 +2,7 @@
 
 import math
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 
 import pandas as pd
@@ -16,10 +16,7 @@ from bench.fly.wire import (
     FOUND_WITHIN_US,
     Found,
     HeardStep,
-    VehicleRecording,
-    heard,
     hit_of,
-    streams_asked_hz,
     watch_all,
 )
 from bench.rows.contacts import angle_deg
@@ -66,12 +63,10 @@ def rows(results: Results) -> pd.DataFrame:
 
 
 def first_possible(
-    recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
+    contact_m_s2: Mapping[int, float], arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
 ) -> tuple[int | None, list[int]]:
     """The first received sample whose averaging window holds the contact's force above the floor, by the truth; None
     where the contact fell between the samples. And when each sample arrived."""
-    forces = zip(recording.samples, recording.contact_m_s2, strict=True)
-    contact_m_s2 = {sample.time_boot_us: force for sample, force in forces}
     times, first = list[int](), None
     for step in arrived:
         stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
@@ -87,19 +82,17 @@ def first_possible(
 def work_out_hit(case: HitCase) -> Json:
     """Fly it once, then let every detector hear it at every rate: a row for each."""
     vehicle = vehicle_of_hit(case)
-    recording, hit = hit_of(case, vehicle.airframe)
-    touch_us = hit.contact_at_boot_us
+    flown = hit_of(case, vehicle.airframe)
+    hit, touch_us = flown.hit, flown.hit.contact_at_boot_us
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
     truth = {"true_speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s)}
     rows = []
-    for rate in ASKED_HZ:
-        arrived = heard(recording, streams_asked_hz(rate), case.seed + rate)
-        possible_us, times_us = first_possible(recording, arrived, touch_us, floor_m_s2)
+    for rate, arrived in flown.heard.items():
+        possible_us, times_us = first_possible(flown.contact_m_s2, arrived, touch_us, floor_m_s2)
         possible_ms = None if possible_us is None else 1e-3 * (possible_us - touch_us)
         for name in BaselineConfig.detectors:
-            found, touches = watch_all(
-                BaselineConfig.model_validate({**vehicle.settings, "detector": name}), arrived, recording.situations
-            )
+            config = BaselineConfig.model_validate({**vehicle.settings, "detector": name})
+            found, touches = watch_all(config, arrived)
             told = sum(touch.impact.sample_time_boot_us >= touch_us for touch in touches)
             entry = _entry(found, hit, possible_us, times_us) | {"touches": told}
             rows.append({**truth, "rate": rate, "possible_ms": possible_ms, "detector": name, **entry})
