@@ -7,22 +7,13 @@ import math
 
 import numpy as np
 
-from bench.cases.hits import (
-    HEIGHT_M,
-    POLE_OFFSET_SHARES,
-    SPEEDS_M_S,
-    HitCase,
-    obstacle_before,
-    vehicle_of_hit,
-    velocity_towards,
-)
+from bench.cases.hits import POLE_OFFSET_SHARES, SPEEDS_M_S, HitCase, vehicle_of_hit
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.lockstep import Stepped
-from bench.fly.wire import FOLLOWED_S, PATIENCE_S
+from bench.fly.wire import FOLLOWED_S, PATIENCE_S, hits_so_far, on_its_way
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.physics.layout import HIT_ACTIVE
-from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 
 # What is met sideways; each as often as the others.
@@ -52,21 +43,15 @@ def draw_flown(seed: int, is_drawn: bool, airframe: str | None = None) -> HitCas
 
 
 def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:
-    """From HEIGHT_M, steadily on the way, to rest or as long as may be; the boot time from which it rested."""
-    built, rng = vehicle_of_hit(hit), np.random.default_rng([hit.seed, 1])
-    velocity, free_s = velocity_towards(hit, built.airframe, rng), float(rng.uniform(*FREE_FLIGHT_S))
-    at = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity
-    scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, POLE_OFFSET_SHARES[0]))
-    vehicle = SimulatedVehicle(built.airframe, scene, hit.seed)
-    vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
+    """Steadily on the way, to rest or as long as may be; the boot time from which it rested."""
+    built = vehicle_of_hit(hit)
+    vehicle, _, free_s = on_its_way(hit, built.airframe, FREE_FLIGHT_S, POLE_OFFSET_SHARES[0])
     streams = {"highres_imu_hz": hit.imu_hz, "window_s": WINDOW_S}
     guard = Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}}))
     flight = Stepped(vehicle, guard)
     flight.links[0].introduce()
     rest_us = to_rest(flight, guard, free_s + PATIENCE_S)
-    if vehicle.state.hit[HIT_ACTIVE] == 1.0:
-        # Still leaning on it: what has happened so far is the hit.
-        vehicle.truth.add_hit(vehicle.state.hit, scene.world())
+    hits_so_far(vehicle)
     return vehicle, guard, rest_us
 
 

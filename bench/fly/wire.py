@@ -23,6 +23,7 @@ from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
+from sim_vehicle.world import build_world
 
 Vector3 = tuple[float, float, float]
 # HIGHRES_IMU asked for, by what a client of PX4 receives of it.
@@ -79,6 +80,33 @@ PATIENCE_S = 3.0
 FOLLOWED_S = 0.45
 
 
+START_NED_M = np.array([0.0, 0.0, -HEIGHT_M])
+
+
+def on_its_way(
+    case: HitCase, airframe: Airframe, free_flight_s: tuple[float, float], offset_share: float, any_side: bool = False
+) -> tuple[SimulatedVehicle, Floats, float]:
+    """The vehicle in free flight, nose ahead or anywhere; its velocity, and how long until it meets the obstacle."""
+    rng = np.random.default_rng([case.seed, 1])
+    velocity, free_s = velocity_towards(case, airframe, rng), float(rng.uniform(*free_flight_s))
+    yaw_rad = float(rng.uniform(-math.pi, math.pi)) if any_side else None
+    place = START_NED_M + free_s * velocity
+    obstacle = obstacle_before(case, airframe, place, velocity, rng, offset_share)
+    vehicle = SimulatedVehicle(airframe, Scene.model_validate(obstacle), case.seed)
+    if case.approach == "ceiling":
+        # Stored so that it may be less than PX4 lets anybody ask for.
+        vehicle.parameters["MPC_Z_V_AUTO_UP"] = -float(velocity[2])
+    vehicle.begin_in_flight(_triple(START_NED_M), _triple(velocity), yaw_rad)
+    return vehicle, velocity, free_s
+
+
+def hits_so_far(vehicle: SimulatedVehicle) -> Sequence[Hit]:
+    """The one that a vehicle still leans on is as it has been so far."""
+    if vehicle.state.hit[HIT_ACTIVE] == 1.0:
+        vehicle.truth.add_hit(vehicle.state.hit, build_world(vehicle.obstacles))
+    return vehicle.truth.hits
+
+
 class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
     """The vehicle went past the obstacle: the case is at fault, not a detector."""
 
@@ -93,28 +121,18 @@ def hit_of(case: HitCase, airframe: Airframe) -> HeardHit:
 
 def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]) -> HeardHit:
     """Straight on into the obstacle, and on for a moment. Raises NoTouch."""
-    rng = np.random.default_rng([case.seed, 1])
-    velocity = velocity_towards(case, airframe, rng)
-    free_s, yaw_rad = float(rng.uniform(*FREE_FLIGHT_S)), float(rng.uniform(-math.pi, math.pi))
-    start = np.array([0.0, 0.0, -HEIGHT_M])
-    obstacle = obstacle_before(case, airframe, start + free_s * velocity, velocity, rng, offset_share)
-    scene = Scene.model_validate(obstacle)
-    vehicle = SimulatedVehicle(airframe, scene, case.seed)
-    if case.approach == "ceiling":
-        # Stored so that it may be less than PX4 lets anybody ask for.
-        vehicle.parameters["MPC_Z_V_AUTO_UP"] = -float(velocity[2])
-    vehicle.begin_in_flight(_triple(start), _triple(velocity), yaw_rad)
+    vehicle, velocity, free_s = on_its_way(case, airframe, FREE_FLIGHT_S, offset_share, any_side=True)
     ears = {rate: _ear(vehicle, rate) for rate in ASKED_HZ}
     heard: dict[int, list[HeardStep]] = {rate: [] for rate in ASKED_HZ}
     contact, contact_m_s2 = _Contact(), dict[int, float]()
-    truth, hit_row, interval_s = vehicle.truth, vehicle.state.hit, 1e-6 * vehicle.interval_us
+    hit_row, interval_s = vehicle.state.hit, 1e-6 * vehicle.interval_us
     left, touched = round((free_s + PATIENCE_S) / interval_s), False
     while left > 0:
         vehicle.advance()
         left, now_us = left - 1, vehicle.time_boot_us
         contact_m_s2[now_us] = contact.added_n_s(hit_row) / (airframe.mass_kg * interval_s)
         off_reason, height_m = "takeoff" if now_us < 1e6 * SWITCHED_ON_AFTER_S else None, -float(vehicle.state.body[2])
-        asked_ned_m = _triple(start + 1e-6 * now_us * velocity)
+        asked_ned_m = _triple(START_NED_M + 1e-6 * now_us * velocity)
         situation = Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
         for rate, (link, decoder) in ears.items():
             samples = tuple(sample for _, sample in decoder.feed(b"".join(link.take())) if sample is not None)
@@ -124,10 +142,7 @@ def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET
             touched, left = True, round(FOLLOWED_S / interval_s)
     if not touched:
         raise NoTouch(f"{case.approach} at {case.speed_m_s} m/s was missed")
-    if not truth.hits:
-        # Still leaning on it: what has happened so far is the hit.
-        truth.add_hit(hit_row, scene.world())
-    return HeardHit(truth.hits[0], heard, contact_m_s2)
+    return HeardHit(hits_so_far(vehicle)[0], heard, contact_m_s2)
 
 
 def _ear(vehicle: SimulatedVehicle, rate: int) -> tuple[Link, Decoder]:
