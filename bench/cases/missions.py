@@ -129,7 +129,7 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         "fence": room.fence,
         "companion": {
             "streams": {"highres_imu_hz": STREAMS_HZ[stream_hz]},
-            **(companion_settings(airframe_data(case)) if case.is_drawn else {}),
+            **(companion_settings(airframe_of(case)) if case.is_drawn else {}),
         },
         "sim": {
             "airframe": case.airframe,

@@ -119,9 +119,8 @@ def _arms(draw: Draw, kind: str, arm_m: float, guard_m: float, yaw_kg_m2: float)
     }
 
 
-def companion_settings(data: Part) -> Part:
+def companion_settings(airframe: Airframe) -> Part:
     """What its owner writes into `companion:`, from a ruler, a scale and the IMU's data sheet."""
-    airframe = Airframe.model_validate(with_base(data))
     return {
         "estimate": {
             "imu_averaging_interval_s": airframe.imu.integration_interval_us * 1e-6,
@@ -148,5 +147,5 @@ def vehicle_of(kind: str, seed: int | None = None) -> BenchVehicle:
     if seed is None:
         airframe = load_world(None, (), kind, None).airframe
         return BenchVehicle(airframe, {"estimate": {"guards": guards_of(airframe)}})
-    data = drawn_vehicle(seed, kind)
-    return BenchVehicle(Airframe.model_validate(with_base(data)), companion_settings(data))
+    airframe = Airframe.model_validate(with_base(drawn_vehicle(seed, kind)))
+    return BenchVehicle(airframe, companion_settings(airframe))

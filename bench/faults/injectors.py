@@ -136,16 +136,11 @@ def strangers(when: When, copies: int = 1) -> Injector:
 def denied(when: When) -> Injector:
     """Answers to commands in the vehicle's name: what was asked for is denied."""
     fields = {"command": SET_MODE, "result": 2, "target_system": 1, "target_component": COMPONENT_ID}
-    intervals = 0
-
-    def note(frames: list[bytes]) -> None:
-        nonlocal intervals
-        intervals += 1
 
     def act(air: Air, frames: list[bytes]) -> Sequence[bytes]:
-        return frames if intervals % _DENIED_EVERY else [*frames, made("COMMAND_ACK", fields)]
+        return frames if air.intervals % _DENIED_EVERY else [*frames, made("COMMAND_ACK", fields)]
 
-    return Injector(when, to_companion=act, note=note)
+    return Injector(when, to_companion=act)
 
 
 def taken(when: When, stall_s: float = 0.0, cut_s: float = 0.0) -> Injector:

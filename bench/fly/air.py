@@ -120,7 +120,7 @@ class Air:
     _waiting: list[bytes] = field(default_factory=list)
     _station: GroundStation | None = None
     _readings: int = 0
-    _intervals: int = 0
+    intervals: int = 0  # of the vehicle's, that have passed
 
     @property
     def now_s(self) -> float:
@@ -233,12 +233,12 @@ class Air:
         self.pilot_at_s = self.now_s
 
     def _fly_sticks(self) -> None:
-        self._intervals += 1
+        self.intervals += 1
         if self._station is None:
             return
-        if self._intervals % _STICKS_EVERY == 0:
+        if self.intervals % _STICKS_EVERY == 0:
             self._station.move_sticks()
-        if self._intervals % _BEAT_EVERY == 0:
+        if self.intervals % _BEAT_EVERY == 0:
             self._station.beat()
 
 
