@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -13,32 +12,21 @@ MET, MISSED, REPORTED = "met", "**missed**", "reported"
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """What must be shown, with the figure and a verdict; `is_met` None where there is no bar."""
-
-    what: str
-    wanted: str
-    measured: str
-    is_met: bool | None
-    of: str = ""
-
-    @property
-    def verdict(self) -> str:
-        return REPORTED if self.is_met is None else MET if self.is_met else MISSED
+Bar = dict[str, str]
+"""A row: what must be shown, the bar, the figure, the verdict, and of how many."""
 
 
-def bars_text(bars: Sequence[Bar]) -> str:
-    return table(
-        [{"what": b.what, "bar": b.wanted, "measured": b.measured, "verdict": b.verdict, "of": b.of} for b in bars]
-    )
+def bar(what: str, wanted: str, measured: str, is_met: bool | None, of: str) -> Bar:
+    """`is_met` None where there is nothing to meet."""
+    verdict = REPORTED if is_met is None else MET if is_met else MISSED
+    return {"what": what, "bar": wanted, "measured": measured, "verdict": verdict, "of": of}
 
 
 def summary_text(bars: Sequence[Bar]) -> str:
     """For the terminal: how many are met, and which are not."""
-    judged = [bar for bar in bars if bar.is_met is not None]
-    missed = [bar for bar in judged if not bar.is_met]
-    return f"{len(judged) - len(missed)} of {len(judged)} bars are met. Missed: {bars_text(missed)}"
+    judged = [one for one in bars if one["verdict"] != REPORTED]
+    missed = [one for one in judged if one["verdict"] == MISSED]
+    return f"{len(judged) - len(missed)} of {len(judged)} bars are met. Missed: {table(missed)}"
 
 
 def table(rows: pd.DataFrame | Sequence[Mapping[str, object]]) -> str:
@@ -59,7 +47,7 @@ def share_bar(what: str, holds: "pd.Series[bool]", least: float | None = None) -
     part, count = float(holds.astype(bool).mean()), len(holds)
     wanted = "" if least is None else f"≥ {100 * least:g} %"
     is_met = part >= least if least is not None and count else None
-    return Bar(what, wanted, f"{per_cent(part, 2)} %", is_met, f"{count - sum(holds)} of {count} not")
+    return bar(what, wanted, f"{per_cent(part, 2)} %", is_met, f"{count - sum(holds)} of {count} not")
 
 
 def rms(values: Iterable[float]) -> float:

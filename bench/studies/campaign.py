@@ -13,7 +13,7 @@ from bench.fly.campaign import Results
 from bench.fly.lockstep import NOTICED_M_S, fly
 from bench.rows.judge import failures, work_out_mission
 from bench.rows.recovered import UNANSWERED
-from bench.rows.tables import Bar, bars_text, share_bar, summary_text, table
+from bench.rows.tables import Bar, share_bar, summary_text, table
 from bench.studies.study import Shown, own_airframe, run_study, seeds_of
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
@@ -46,7 +46,7 @@ def run_missions(options: Namespace) -> int:
 def shown(results: Results, wanted: Mapping[str, float]) -> Shown:
     flights, hits = mission_rows(results), hit_rows(results)
     bars = mission_bars(flights, hits, wanted)
-    parts = {"What must be shown": bars_text(bars), **tables(flights)}
+    parts = {"What must be shown": table(bars), **tables(flights)}
     return Shown(parts, summary_text(bars), flights)
 
 

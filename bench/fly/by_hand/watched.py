@@ -1,7 +1,7 @@
 """A vehicle, whoever watches it and a ground station on virtual time; impacts that are reported, beside the truth."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from bench.fly.lockstep import Stepped
 from bench.fly.station import GroundStation
+from companion.autopilot.known import GUARDED_MODES
 from companion.companion import Companion, StepResult
+from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.detection.detector import Impact, Phase
@@ -44,6 +46,11 @@ class Watcher:
     reported: list[Row] = field(default_factory=list)
     watched_s: float = 0.0
     impact: Impact | None = None  # the newest
+
+
+def guard_in_any_mode(settings: Mapping[str, Any]) -> Guard:
+    """It watches manual flight, too; with these settings of the companion."""
+    return Guard(GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings}))
 
 
 class GuardedFlight(Stepped):

@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from bench.cases.vehicles import BenchVehicle
-from bench.fly.by_hand.watched import GuardedFlight, Sticks
-from companion.autopilot.known import GUARDED_MODES
+from bench.fly.by_hand.watched import GuardedFlight, Sticks, guard_in_any_mode
 from companion.companion import Companion
-from companion.guard.config import GuardConfig
-from companion.guard.guard import Guard
 from companion.mission.model import Mission
 from companion.motion.config import GRAVITY_M_S2
 from sim_vehicle.airframe import Airframe, Bounce
@@ -95,8 +92,7 @@ def begun(
     away_m, side_rad = RTL_AWAY_M * (case.way == "AUTO.RTL"), rng.uniform(-math.pi, math.pi)
     place = (away_m * math.cos(side_rad), away_m * math.sin(side_rad), -height_m)
     vehicle.begin_in_flight(place, (0.0, 0.0, 0.0))
-    config = GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings})
-    return GuardedFlight(vehicle, Guard(config)), error_m
+    return GuardedFlight(vehicle, guard_in_any_mode(settings)), error_m
 
 
 def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -108,10 +104,11 @@ def falling(way: str, at_s: float, rng: np.random.Generator) -> list[dict[str, A
     return [{"kind": "free_fall", "at_s": at_s}]
 
 
-def to_the_end(flight: GuardedFlight) -> None:
+def to_the_end(flight: GuardedFlight, act: Callable[[], None] = lambda: None) -> None:
     """Until a while after the first touch of the ground; the one before take-off is none."""
     end_s = LONGEST_S
     while flight.time_s < end_s and not flight.watchers[0].program.finished:
+        act()
         flight.step()
         if flight.height_m > UP_M and not flight.looks_for_ground:
             flight.watch_for_ground()
@@ -122,17 +119,18 @@ def to_the_end(flight: GuardedFlight) -> None:
 def land(flight: GuardedFlight, way: str, airframe: Airframe, sink_m_s: float, rng: np.random.Generator) -> None:
     """By the mode, or by a pilot who lowers the throttle when the touch is felt."""
     flight.watch_for_ground()
-    end_s, asked_s = LONGEST_S, STICKS_FROM_S if way in BY_STICKS else BEGINS_S
+    asked_s = STICKS_FROM_S if way in BY_STICKS else BEGINS_S
     sticks = lowering(flight, airframe, sink_m_s, rng)
-    while flight.time_s < end_s:
+
+    def act() -> None:
+        nonlocal asked_s
         if way in BY_STICKS:
             flight.fly_sticks(sticks)
         if flight.time_s > asked_s and flight.touched_us is None and flight.status.vehicle_mode != way:
             flight.station.set_mode(way)
             asked_s = flight.time_s + 0.5
-        flight.step()
-        if flight.touched_us is not None:
-            end_s = 1e-6 * flight.touched_us + LOOKED_AFTER_S
+
+    to_the_end(flight, act)
 
 
 def lowering(

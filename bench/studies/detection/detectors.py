@@ -20,7 +20,7 @@ from bench.fly.wire import (
     watch_all,
 )
 from bench.rows.contacts import angle_deg
-from bench.rows.tables import Bar, bars_text, per_cent, rms, share_bar, summary_text, table, text_of
+from bench.rows.tables import Bar, bar, per_cent, rms, share_bar, summary_text, table, text_of
 from bench.studies.study import Shown, run_study, seeds_of
 from companion.messages import ImuSample
 from sim_vehicle.truth import Hit
@@ -50,7 +50,7 @@ def run_detectors(options: Namespace) -> int:
 def shown(results: Results) -> Shown:
     hits = rows(results)
     bars = all_bars(hits)
-    return Shown({"What must be shown": bars_text(bars), **all_tables(hits)}, summary_text(bars), hits)
+    return Shown({"What must be shown": table(bars), **all_tables(hits)}, summary_text(bars), hits)
 
 
 def rows(results: Results) -> pd.DataFrame:
@@ -190,4 +190,4 @@ def _hit_bars(where: str, least: float, hits: pd.DataFrame) -> Iterator[Bar]:
 def _rms_bar(what: str, errors: "pd.Series[float]", most: float) -> Bar:
     error = rms(errors)
     is_met = error <= most if len(errors) else None
-    return Bar(what, f"≤ {most:g} RMS", text_of(error, 3), is_met, f"{len(errors)} hits")
+    return bar(what, f"≤ {most:g} RMS", text_of(error, 3), is_met, f"{len(errors)} hits")

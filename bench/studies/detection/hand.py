@@ -10,15 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bench.cases.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
+from bench.cases.vehicles import AIRFRAMES, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
-from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, guard_in_any_mode
 from bench.fly.campaign import Results
 from bench.rows.tables import at_most_an_hour, by_each
 from bench.studies.study import Shown, run_study, seeds_of
-from companion.autopilot.known import GUARDED_MODES
-from companion.guard.config import GuardConfig
-from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -115,7 +112,7 @@ def fly_by_hand(case: HandCase) -> Row:
     air = str(rng.choice(list(AIR)))
     scene = Scene.model_validate({"faults": AIR[air](rng)})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
-    guards = [Guard(_config(built, imu_hz)) for imu_hz in IMU_HZ]
+    guards = [guard_in_any_mode({**built.settings, "streams": {"highres_imu_hz": float(hz)}}) for hz in IMU_HZ]
     flight = GuardedFlight(vehicle, *guards)
     tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode, guards).fly()
     return {
@@ -132,11 +129,6 @@ def fly_by_hand(case: HandCase) -> Row:
             for imu_hz, watcher in zip(IMU_HZ, flight.watchers, strict=True)
         ],
     }
-
-
-def _config(built: BenchVehicle, imu_hz: int) -> GuardConfig:
-    settings = {**built.settings, "streams": {"highres_imu_hz": float(imu_hz)}}
-    return GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings})
 
 
 def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:
