@@ -100,7 +100,7 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
     stream_hz = draw.one_of(list(STREAMS_HZ))
     wind, wind_m_s = _wind(draw)
     height_m = draw.number(1.0, min(2.2, room.highest_m))
-    extras = [_TAKEOFF_EXTRA] if draw.happens(0.05) and _over_start(room, draw, height_m) else []
+    extras = ["beam over the start"] if draw.happens(0.05) and _over_start(room, draw, height_m) else []
     route = Route(draw, room, (0.0, 0.0), height_m)
     items: list[Part] = [{"takeoff": {"height_m": height_m}}]
     for _ in range(draw.whole(1, 3)):
@@ -140,9 +140,6 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         },
     }
     return RandomMission(data, room.kind, stream_hz, wind_m_s, tuple(extras))
-
-
-_TAKEOFF_EXTRA, _CART_EXTRA, _BLOCK_EXTRA = "beam over the start", "cart", "block at the landing"
 
 
 def _wind(draw: Draw) -> tuple[Part, float]:
@@ -197,7 +194,7 @@ def _cart(room: DrawnRoom, draw: Draw, route: Route) -> str:
         "yaw_deg": draw.number(0.0, 90.0),
     }
     room.boxes.append(box | {"motion": {"path": path}})
-    return _CART_EXTRA
+    return "cart"
 
 
 def _block(room: DrawnRoom, draw: Draw, route: Route) -> str:
@@ -207,7 +204,7 @@ def _block(room: DrawnRoom, draw: Draw, route: Route) -> str:
     n, e = towards(route.place_ne_m, way, 0.5 * size[0] + draw.number(0.14, 0.2))
     centre = [n, e, round(-0.5 * size[2], DIGITS)]
     room.boxes.append({"name": "block", "centre_ned_m": centre, "size_m": size, "yaw_deg": round(math.degrees(way), 1)})
-    return _BLOCK_EXTRA
+    return "block at the landing"
 
 
 def _last(draw: Draw, room: DrawnRoom) -> Part:

@@ -20,12 +20,12 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
+from sim_vehicle.quantities import Vector3, vector
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import build_world
 
-Vector3 = tuple[float, float, float]
 # HIGHRES_IMU asked for, by what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
@@ -96,7 +96,7 @@ def on_its_way(
     if case.approach == "ceiling":
         # Stored so that it may be less than PX4 lets anybody ask for.
         vehicle.parameters["MPC_Z_V_AUTO_UP"] = -float(velocity[2])
-    vehicle.begin_in_flight(_triple(START_NED_M), _triple(velocity), yaw_rad)
+    vehicle.begin_in_flight(vector(START_NED_M), vector(velocity), yaw_rad)
     return vehicle, velocity, free_s
 
 
@@ -132,7 +132,7 @@ def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET
         left, now_us = left - 1, vehicle.time_boot_us
         contact_m_s2[now_us] = contact.added_n_s(hit_row) / (airframe.mass_kg * interval_s)
         off_reason, height_m = "takeoff" if now_us < 1e6 * SWITCHED_ON_AFTER_S else None, -float(vehicle.state.body[2])
-        asked_ned_m = _triple(START_NED_M + 1e-6 * now_us * velocity)
+        asked_ned_m = vector(START_NED_M + 1e-6 * now_us * velocity)
         situation = Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
         for rate, (link, decoder) in ears.items():
             samples = tuple(sample for _, sample in decoder.feed(b"".join(link.take())) if sample is not None)
@@ -153,10 +153,6 @@ def _ear(vehicle: SimulatedVehicle, rate: int) -> tuple[Link, Decoder]:
         asked_hz = ASKED_HZ[rate] if stream.message_id is MessageId.HIGHRES_IMU else stream.asked_hz
         link.streams.set_interval(stream.message_id, 1e6 / asked_hz)
     return link, decoder
-
-
-def _triple(vector: Floats) -> Vector3:
-    return float(vector[0]), float(vector[1]), float(vector[2])
 
 
 # --- what detectors find

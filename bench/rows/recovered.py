@@ -12,9 +12,8 @@ from bench.rows.contacts import JudgedContact, Role, phases_of
 from companion.reflex.recovery.collision import CollisionReport
 from companion.reflex.surface import away_from
 from rebound_cli.results.summary import LONGEST_RECOVERY_S
-from rebound_cli.results.truth_match import Vector3
 from sim_vehicle.truth import Hit
-from sim_vehicle.world import Obstacle
+from sim_vehicle.world import distance_m
 
 Floats = npt.NDArray[np.float64]
 
@@ -123,15 +122,7 @@ def _returned(flight: JudgedFlight, first: JudgedContact, before: JudgedContact,
     if obstacle is None or len(between) == 0:
         return False
     rows = [*between[::_LOOK_EVERY], between[-1]]
-    off_m = [_distance_m(obstacle, flight.truth.series["position_ned_m"][row], time_us[row]) for row in rows]
+    off_m = [distance_m(obstacle, flight.truth.series["position_ned_m"][row], 1e-6 * time_us[row]) for row in rows]
     has_left = max(off_m) - off_m[0] > MOVED_M
     is_answered = touch.hit.contact_at_boot_us - first.hit.contact_at_boot_us > UNANSWERED_US
     return (has_left or is_answered) and max(off_m) - off_m[-1] > CAME_BACK_M
-
-
-def _distance_m(obstacle: Obstacle, place_ned_m: Vector3, boot_us: float) -> float:
-    """From a place to an obstacle as it stands at a time."""
-    if obstacle.motion is not None:
-        moved = obstacle.motion.offset_ned_m(1e-6 * boot_us)
-        place_ned_m = (place_ned_m[0] - moved[0], place_ned_m[1] - moved[1], place_ned_m[2] - moved[2])
-    return obstacle.distance_m(place_ned_m)

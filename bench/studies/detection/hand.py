@@ -58,10 +58,6 @@ Faults = list[dict[str, Any]]
 GUSTS_FROM_S, GUSTS_UNTIL_S, GUSTS = 20.0, 95.0, 6
 
 
-def _calm(rng: np.random.Generator) -> Faults:
-    return []
-
-
 def _gusts(rng: np.random.Generator) -> Faults:
     """Up to 8 m/s from any side within a fifth of a second to a second."""
     faults = []
@@ -94,7 +90,7 @@ def _vibration(rng: np.random.Generator) -> Faults:
 
 
 AIR: dict[str, Callable[[np.random.Generator], Faults]] = {
-    "calm": _calm,
+    "calm": lambda rng: [],
     "gusts": _gusts,
     "turbulence": _turbulence,
     "vibration": _vibration,
