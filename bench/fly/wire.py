@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.cases.hits import HEIGHT_M, POLE_OFFSET_SHARES, Floats, HitCase, obstacle_before, velocity_towards
-from bench.detectors.config import BaselineConfig
 from companion.link.streams import wanted_streams
 from companion.mavlink.decode import Decoder
 from companion.messages import LandedState, MessageId, Sample
@@ -156,9 +155,6 @@ def _ear(vehicle: SimulatedVehicle, rate: int) -> tuple[Link, Decoder]:
 
 
 # --- what detectors find
-
-FLOWN_WITH = BaselineConfig().detector
-"""The detector of a drone."""
 
 # A hit that is reported no later than this after its first touch has been found.
 FOUND_WITHIN_US = 400_000

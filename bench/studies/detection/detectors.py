@@ -10,15 +10,7 @@ import pandas as pd
 from bench.cases.hits import SPEEDS_M_S, HitCase, draw_case, vehicle_of_hit
 from bench.detectors.config import BaselineConfig
 from bench.fly.campaign import Json, Results
-from bench.fly.wire import (
-    ASKED_HZ,
-    FLOWN_WITH,
-    FOUND_WITHIN_US,
-    Found,
-    HeardStep,
-    hit_of,
-    watch_all,
-)
+from bench.fly.wire import ASKED_HZ, FOUND_WITHIN_US, Found, HeardStep, hit_of, watch_all
 from bench.rows.contacts import angle_deg
 from bench.rows.tables import Bar, bar, per_cent, rms, share_bar, summary_text, table, text_of
 from bench.studies.study import Shown, run_study, seeds_of
@@ -26,7 +18,7 @@ from companion.messages import ImuSample
 from sim_vehicle.truth import Hit
 
 # What the drone's own detector must show, by airframe and rate received.
-DEFAULT, SLOWEST_M_S = FLOWN_WITH, SPEEDS_M_S[0]
+DEFAULT, SLOWEST_M_S = BaselineConfig().detector, SPEEDS_M_S[0]
 FOUND_BARS = {("foldable", rate): 1.0 for rate in ASKED_HZ}
 FOUND_BARS |= {("rigid", 246): 1.0, ("rigid", 100): 0.995, ("rigid", 50): 0.97}
 LATE_BAR = 0.01
