@@ -66,6 +66,9 @@ def test_what_moves_before_anybody_arms_it_is_refused(vehicle: Callable[[Airfram
     data["surface"]["foot"]["contact_time_s"] = 1e-5
     with pytest.raises(AirframeError, match=r"rigid moves by .* disarmed; see"):
         vehicle(Airframe.model_validate(data), Scene(), 1)
+    # As soft as grass they give by more than a centimetre, and stand
+    data["surface"]["foot"] |= {"contact_time_s": 0.08, "restitution": 0.05}
+    vehicle(Airframe.model_validate(data), Scene(), 1)
 
 
 @pytest.mark.parametrize(("wind_ned_m_s", "is_held"), [((0, 24, 0), True), ((18, 18, 0), False), ((0, 0, 20), False)])
