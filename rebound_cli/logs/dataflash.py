@@ -212,8 +212,10 @@ def _losses(topics: _Topics, estimate: Topic, window_us: float | None) -> Iterat
     if estimate:
         yield from slow_velocity("XKF1", estimate.rate_hz())
     flags = _of_primary(topics["XKF4"], topics["XKF4"]).column("SS")
+    if flags is None or not len(flags):
+        return
     for what, bit in _GOOD.items():
-        if flags is not None and (share := 100 * float(np.mean(flags.astype(np.int64) & bit == 0))):
+        if share := 100 * float(np.mean(flags.astype(np.int64) & bit == 0)):
             yield f"the {what} is invalid by the estimator's own word for {share:.0f} % of the log: so is v_c"
 
 

@@ -223,3 +223,6 @@ def test_what_is_missing_is_said_with_its_cost(tmp_path):
     losses = read(tmp_path, rows).losses
     assert any("horizontal velocity is invalid" in loss and "75 %" in loss for loss in losses)
     assert not any("vertical velocity" in loss for loss in losses)
+    # Of the primary core nothing is logged, and nothing is said
+    losses = read(tmp_path, [COPTER, *IMU, ("XKF4", 1_000_000, 1, 0, 0)]).losses
+    assert not any("own word" in loss for loss in losses)
