@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from companion.autopilot.interface import AWAY_M_S2
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
 from companion.flight.envelope import Surroundings, bounded
@@ -33,7 +32,7 @@ from companion.messages import (
 from companion.mission.model import Mission
 from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
-from companion.reflex.config import HELD_S, LEAD_S, NOTICED_S
+from companion.reflex.config import AWAY_M_S2, HELD_S, LEAD_S, NOTICED_S
 from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import braked

@@ -7,9 +7,6 @@ from enum import Enum
 from companion.autopilot.setup import PreflightItem, SerialLine, Setup
 from companion.messages import MessageId, VehicleCommand
 
-# Of the tilt that a dead companion has said, off the obstacle: as much as the vehicle's own attitude may be wrong by.
-AWAY_M_S2 = 1.5
-
 
 class Pilot(Enum):
     """Who moves the vehicle in a mode."""

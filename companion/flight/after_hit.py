@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from companion.flight.context import FlightContext, Target, Transition
+from companion.flight.context import BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import TABLE, State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, WaitForItem
 from companion.mission.policy import OnCollision
@@ -66,19 +66,22 @@ _BACK_TO = {state: trigger for trigger, state in TABLE[State.RECOVERING].items()
 
 def note_before(flight: FlightContext, state: State) -> None:
     """Save the state before a hit is recorded. Within a recovery there is nothing to restore."""
-    before = state, flight.step_index, replace(flight.tally), flight.after_recovery
+    before = BeforeHit(state, flight.step_index, replace(flight.tally), flight.after_recovery)
     flight.before_hit = None if state is State.RECOVERING else before
 
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     """Remove the rejected newest hit, and go on with what it interrupted; None within another hit's recovery."""
-    if flight.before_hit is None:
+    before = flight.before_hit
+    if before is None:
         return None
     flight.reflex.take_back()
     flight.unconfirmed += 1
     text = "not a hit: one message showed it, and nothing else did; going on"
     flight.report(now_us, "unconfirmed", text, count=flight.unconfirmed)
-    state, flight.step_index, flight.tally, flight.after_recovery = flight.before_hit
+    flight.tally = before.tally
+    flight.step_index = before.step_index
+    flight.after_recovery = before.after_recovery
     flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
     # A climb goes on as the mission's first item.
-    return Transition(_BACK_TO.get(state, Trigger.RECOVERED_TO_RETRY))
+    return Transition(_BACK_TO.get(before.state, Trigger.RECOVERED_TO_RETRY))

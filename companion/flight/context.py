@@ -99,6 +99,16 @@ class StepTally:
     left: MotionItem | None = None  # of the item's motion, when it was interrupted
 
 
+@dataclass(frozen=True, slots=True)
+class BeforeHit:
+    """The state before a hit, restored where the hit is rejected."""
+
+    state: State
+    step_index: int
+    tally: StepTally
+    after_recovery: Transition
+
+
 @dataclass(slots=True)
 class Expectation:
     """An assertion of the mission's: pending until it is known whether it is met."""
@@ -141,8 +151,7 @@ class FlightContext:
     is_landing: bool = False  # ordered, and begun again after every hit on the way down
     file_awaited: str | None = None  # until it is there
     expectations: list[Expectation] = field(default_factory=list)
-    # State, step, tally and what was to follow a recovery, restored where the hit is rejected.
-    before_hit: tuple[State, int, StepTally, Transition] | None = None
+    before_hit: BeforeHit | None = None
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)

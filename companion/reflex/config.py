@@ -175,6 +175,9 @@ MOST_HELD_S = 0.3
 # PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4
 # changed to hold after 1.04 to 1.13 s (bench/notes/px4.md).
 HELD_S, NOTICED_S = 1.0, 0.13
+# A killed companion's last tilt leads off the obstacle by this, too: what a level that is wrong by 9 degrees leads to.
+# Without it a real PX4 touched again after one kill in seven (bench/notes/decisions.md).
+AWAY_M_S2 = 1.5
 
 # --- a crash
 # PX4's failure detector: FD_FAIL_R and FD_FAIL_P, 60 degrees. It waits for 0.3 s (FD_FAIL_R_TTRI); a vehicle that a hit

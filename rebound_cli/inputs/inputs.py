@@ -130,7 +130,7 @@ def world_from(document: Document) -> SimulatedWorld:
 
 @contextmanager
 def _at(document: Document, *path: str | int) -> Iterator[None]:
-    """What the simulator refuses of `sim:` is told with its place. Raises DocumentError."""
+    """What the simulator refuses of `sim:` carries its place. Raises DocumentError."""
     try:
         yield
     except SimulationError as error:

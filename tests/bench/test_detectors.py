@@ -49,7 +49,7 @@ LATE_MS |= {"threshold": (18, 88), "momentum": (12, 60), "tracking": (80, 400)}
 
 @pytest.mark.parametrize("detector", sorted(BaselineConfig.detectors))
 def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it_is_off(detector):
-    """Twice what the published threshold asks for, for sixty milliseconds; the vehicle is thrown back at 2.4 m/s."""
+    """Twice what the published threshold asks for, for sixty milliseconds; the vehicle leaves at 2.4 m/s."""
     (impact,) = fly(detector, wall(40.0))
     assert impact.impact.contact_free_until_boot_us < PUSHED_US
     assert fly(detector, wall(40.0), off="landing") == []
