@@ -33,6 +33,11 @@ TILT_RAD_PER_M_S = 0.11
 # Largest angular acceleration by motors, rad/s^2.
 MOTORS_RAD_S2 = 100.0
 
+# What is further off, in standard deviations, is beyond belief: PX4's gates, such as EKF2_GPS_V_GATE.
+GATE = 5.0
+# Memory of a velocity's noise in velocities: 3 s of the vehicle's own at 30 Hz, 10 to 20 s of a receiver's.
+MEMORY = 100
+
 # --- the velocity's delay
 # Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
 DELAY_S = 0.01
@@ -58,12 +63,8 @@ RECEIVER_REPEATS = 10.0
 # Standard deviation of its noise before it is learnt: PX4's EKF2_GPS_V_NOISE. Not below twice the 0.05 m/s of u-blox's
 # data sheets.
 DOPPLER_M_S, FINEST_DOPPLER_M_S = 0.3, 0.1
-# A velocity further off, in standard deviations, is beyond belief: PX4's EKF2_GPS_V_GATE.
-DOPPLER_GATE = 5.0
 # Standard deviations of the delay by which a velocity is taken for older, so that none from before a hit counts.
 CERTAIN = 2.0
-# Memory of the noise in velocities: 10 to 20 s at the usual rates.
-DOPPLER_MEMORY = 100
 
 
 class SettledConfig(StrictModel):

@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 from companion.messages import GpsFix, LocalPosition, Vector3
 from companion.motion.config import (
     CERTAIN,
-    DOPPLER_GATE,
     DOPPLER_M_S,
-    DOPPLER_MEMORY,
     DRIFT_M2_S3,
     EARTH_M,
     FINEST_DOPPLER_M_S,
+    GATE,
     LEVEL_DRIFT_M2_S5,
     LEVEL_SPREAD_M_S2,
+    MEMORY,
     RECEIVER_DELAY_S,
     RECEIVER_LATEST_S,
     RECEIVER_REPEATS,
@@ -83,12 +83,12 @@ class Doppler:
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
         change = plus(ZERO, 1.0 / RECEIVER_DELAY_S, faster)
-        most_m_s = DOPPLER_GATE * math.sqrt(self.variance_m2_s2)
+        most_m_s = GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
         if math.hypot(*plus(behind, self.delay.delay_s(self.variance_m2_s2), change)) < most_m_s:
             self.delay.learn(behind, change)
         noise = limited(plus(behind, self.delay.delay_s(self.variance_m2_s2), change), most_m_s)
-        self.known = min(self.known + 1, DOPPLER_MEMORY)
+        self.known = min(self.known + 1, MEMORY)
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 
     @property

@@ -12,8 +12,9 @@ from companion.strict_model import NotNegative, Positive, StrictModel
 # --- the specific force's noise
 # Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
 MEAN_MEMORY_S = 0.25
-# Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
-SPREAD_MEMORY_S = 2.0
+# Memory of standard deviations, good to 5 % with 200 samples, to 12 % at the slowest useful rates; and of the thrust's
+# gain, which is known when it is full: it follows a sagging battery (minutes), not a climb, whose thrust is commanded.
+MEMORY_S = 2.0
 # The noise is known after this time: 50 samples at 50 Hz make a standard deviation good to a tenth.
 LEARNT_S = 1.0
 # After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
@@ -21,6 +22,9 @@ SETTLED_US = 300_000
 # The standard deviation is taken larger by this factor, for all tests: vibration changes with the throttle, sooner than
 # it is learnt. Averaging over 5 ms hides what shakes at 200 Hz, and little of what shakes at 250.
 EXCESS = 1.5
+# Sideways a vehicle shakes by this share of what it shakes along its thrust at least, as soon as its rotors turn at
+# different speeds: while they turn alike they cancel each other. In public logs it is 0.32 to 2 times as much.
+LEAST_SIDE_SHARE = 1.0 / 3.0
 
 # --- a sample's force
 # A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On
@@ -36,9 +40,6 @@ JUMP = 2.4
 # A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
 # the maximum of the strongest vehicle.
 STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
-# Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
-# is in the message).
-GAIN_MEMORY_S = 2.0
 # Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
 LEAST_FRACTION = 0.1
 # Error of the gain from the battery, ground effect and a mean that has not converged.
@@ -50,8 +51,6 @@ COMPARED = 3
 # Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
 # between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# Memory of the standard deviation in steps: 3 s at 30 Hz.
-MEMORY = 100
 # Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
 # samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
@@ -125,9 +124,8 @@ PRESSES_M_S2 = 0.5 * HELD_M_S2
 # beyond what lies between them, is by an external torque. Of real PX4s in free flight it is a sine of 0.05 at most
 # (bench/notes/decisions.md).
 FOLLOWS_US, LEAN_ERROR = 300_000, 0.07
-# Other vehicles follow worse. So many of their own standard deviations count, five as PX4's gates, over a time that is
-# long beside a touch's.
-LEAN_ERROR_GATE, LEAN_ERROR_MEMORY_S = 5.0, 10.0
+# Other vehicles follow worse: GATE of their own standard deviations count, over a time that is long beside a touch's.
+LEAN_ERROR_MEMORY_S = 10.0
 
 # --- confirmation of a hit
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.

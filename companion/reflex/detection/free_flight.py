@@ -17,7 +17,7 @@ class ForceNoise:
     variance_m2_s4: Vector3 = ZERO
     load_factor: float = 1.0  # mean, by which the variance was learnt
     known_s: float = 0.0
-    side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
+    side_m_s2: float = 0.0  # standard deviation on the noisier of x and y, and a share of z's at least
     vertical_m_s2: float = 0.0  # standard deviation on z
 
     def learn(self, force_frd_m_s2: Vector3, step_s: float, load_factor: float) -> None:
@@ -28,7 +28,7 @@ class ForceNoise:
         """
         if self.known_s <= 0.0:
             self.mean_frd_m_s2 = force_frd_m_s2
-        known_s = self.known_s = min(self.known_s + step_s, reflex.SPREAD_MEMORY_S)
+        known_s = self.known_s = min(self.known_s + step_s, reflex.MEMORY_S)
         mean_share, share = step_s / min(known_s, reflex.MEAN_MEMORY_S), step_s / known_s
         (f_x, f_y, f_z), (m_x, m_y, m_z), (v_x, v_y, v_z) = force_frd_m_s2, self.mean_frd_m_s2, self.variance_m2_s4
         x, y, z = f_x - m_x, f_y - m_y, f_z - m_z
@@ -37,7 +37,7 @@ class ForceNoise:
         grown = reflex.EXCESS * max(1.0, load_factor / self.load_factor)
         v_x, v_y, v_z = v_x + share * (x * x - v_x), v_y + share * (y * y - v_y), v_z + share * (z * z - v_z)
         self.variance_m2_s4 = (v_x, v_y, v_z)
-        self.side_m_s2 = grown * math.sqrt(max(v_x, v_y))
+        self.side_m_s2 = grown * math.sqrt(max(v_x, v_y, reflex.LEAST_SIDE_SHARE**2 * v_z))
         self.vertical_m_s2 = grown * math.sqrt(v_z)
 
 
@@ -48,34 +48,28 @@ class ThrustGain:
     Changed only by its methods.
     """
 
-    fraction: float = 0.0
-    fraction_boot_us: int = -CURRENT_US
+    fraction: float = 0.0  # of the greatest thrust, as commanded
+    fraction_until_us: int = -1  # until when it counts; not at all where it is too small for a quotient
     full_m_s2: float = 0.0
     known_s: float = 0.0
     most_m_s2: float = reflex.STRONGEST_M_S2  # largest upward specific force that thrust can explain
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
-        self.fraction, self.fraction_boot_us = fraction, time_us
-
-    def is_commanded(self, time_us: int) -> bool:
-        """Whether the commanded thrust is valid, and large enough for a quotient."""
-        return self.fraction >= reflex.LEAST_FRACTION and time_us - self.fraction_boot_us <= CURRENT_US
-
-    @property
-    def is_known(self) -> bool:
-        return self.known_s >= reflex.GAIN_MEMORY_S
+        self.fraction = fraction
+        self.fraction_until_us = time_us + CURRENT_US if fraction >= reflex.LEAST_FRACTION else -1
 
     def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
         """Take the specific force by thrust of one sample of a vehicle in free air.
 
         Propellers push nothing down: a vehicle whose specific force points down lies on its back.
         """
-        if self.is_commanded(time_us) and thrust_m_s2 > 0.0 and elapsed_s > 0.0:
-            self.known_s = min(self.known_s + elapsed_s, reflex.GAIN_MEMORY_S)
+        if time_us <= self.fraction_until_us and thrust_m_s2 > 0.0 and elapsed_s > 0.0:
+            self.known_s = min(self.known_s + elapsed_s, reflex.MEMORY_S)
             self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
-            if self.known_s >= reflex.GAIN_MEMORY_S:
+            if self.known_s >= reflex.MEMORY_S:
                 self.most_m_s2 = reflex.MARGIN * self.full_m_s2
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
         """Expected f_z in free air: from the commanded thrust, else its recent mean."""
-        return -self.full_m_s2 * self.fraction if self.is_known and self.is_commanded(time_us) else mean_m_s2
+        is_known = self.known_s >= reflex.MEMORY_S and time_us <= self.fraction_until_us
+        return -self.full_m_s2 * self.fraction if is_known else mean_m_s2

@@ -206,7 +206,8 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            turn, other = s.turn.value / s.turn.limit, max(ratio, s.force_before[0], s.velocity.ratio)
+            turn, velocity = s.turn.value / s.turn.limit, s.velocity.value / s.velocity.limit
+            other = max(ratio, s.force_before[0], velocity)
             return self._turned(s, earlier_us, situation, motion) if turn * turn + other * other > 1.0 else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         force = minus(f, s.free_frd_m_s2)

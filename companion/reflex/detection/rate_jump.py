@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.config import LONGEST_GAP_US, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.vector import ZERO
-from companion.reflex.config import ACROSS_THRUST, EXCESS, RATE_MEMORY_US, SPREAD_MEMORY_S, FusedConfig
+from companion.reflex.config import ACROSS_THRUST, EXCESS, MEMORY_S, RATE_MEMORY_US, FusedConfig
 from companion.reflex.detection.detector import Innovation
 
-_MEMORY_US = 1e6 * SPREAD_MEMORY_S
+_MEMORY_US = 1e6 * MEMORY_S
 
 
 @dataclass(slots=True)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import shapely
 
 from companion.messages import AttitudeTarget, LocalPosition, Quaternion, Vector3
-from companion.motion.config import GRAVITY_M_S2
+from companion.motion.config import GATE, GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards, unit
@@ -119,7 +119,7 @@ class SustainedForceMonitor:
         is_there = math.hypot(*short) < reflex.PLACE_SPREAD_M
         if goal_ned_m is None:
             self.gain.known_s = 0.0
-        elif is_there or not self.gain.is_known:
+        elif is_there or self.gain.known_s < reflex.MEMORY_S:
             self.gain.learn(now_us, -self.measured_frd_m_s2[2], elapsed_s)
         grown = minus(self.missing_m_s2, self.wind_m_s2)
         pushes = unit(grown)
@@ -156,7 +156,7 @@ class SustainedForceMonitor:
             return None
         error = _beyond(body_to_ned(strapdown.attitude_wxyz, _UP_FRD), [each for _, each in setpoints])
         beyond, leant = math.hypot(*error), unit(error)
-        limit = max(reflex.LEAN_ERROR, reflex.LEAN_ERROR_GATE * math.sqrt(self.error_variance))
+        limit = max(reflex.LEAN_ERROR, GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
         known_s = self.error_known_s = min(self.error_known_s + elapsed_s, reflex.LEAN_ERROR_MEMORY_S)
         self.error_variance += elapsed_s / known_s * (min(beyond, limit) ** 2 - self.error_variance)

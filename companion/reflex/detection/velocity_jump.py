@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from companion.messages import Vector3
+from companion.motion.config import MEMORY
 from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, plus
@@ -54,7 +55,7 @@ class VelocityJump:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""
         self.delay.learn(*self.newest)
         square = along(step, step) / 3.0
-        self.known = min(self.known + 1, reflex.MEMORY)
+        self.known = min(self.known + 1, MEMORY)
         self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
 
     def least_m_s(self, config: FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:

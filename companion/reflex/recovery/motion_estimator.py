@@ -18,7 +18,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.config import (
     CURRENT_US,
     DELAY_S,
-    DOPPLER_GATE,
+    GATE,
     GRAVITY_M_S2,
     LEVEL_SPREAD_M_S2,
     LONGEST_GAP_US,
@@ -193,7 +193,7 @@ class MotionEstimator:
         now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
         known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
         known.predict(now_us, self._summed_m_s)
-        is_odd = known.deviation(doppler) > DOPPLER_GATE
+        is_odd = known.deviation(doppler) > GATE
         was_odd, self._was_odd = self._was_odd, is_odd
         if is_odd and not was_odd:
             return
@@ -204,7 +204,7 @@ class MotionEstimator:
             return
         place = self.motion.position_ned_m
         if doppler.place_ned_m is not None:
-            off = limited(flat(minus(doppler.place_ned_m, place)), DOPPLER_GATE * reflex.PLACE_SPREAD_M)
+            off = limited(flat(minus(doppler.place_ned_m, place)), GATE * reflex.PLACE_SPREAD_M)
             place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
         self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
 

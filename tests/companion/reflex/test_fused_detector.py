@@ -357,6 +357,15 @@ def test_the_noise_of_a_climb_is_that_of_its_samples():
     assert climbing.state.threshold_m_s2 == pytest.approx(6.3 * 2.0, rel=0.15)
 
 
+def test_what_shakes_along_its_thrust_may_shake_sideways_a_third_as_much_at_once():
+    def shakes(t):
+        return (-1) ** (t // WINDOW_US)
+
+    calm = {"lift": lambda t: GRAVITY + 3.0 * shakes(t), "heard": (Attitude, AttitudeTarget)}
+    assert Flight(lambda t: (4.5 * shakes(t) * (t > HIT_US), 0.0, 0.0), **calm).fly() == []
+    assert len(Flight(pulse((0.0, 7.5, 0.0), HIT_US, 20_000), **calm).fly()) == 1
+
+
 @pytest.mark.parametrize(("before", "now", "shakes"), [(1.0, 1.0, 1.0), (1.0, 1.5, 1.5), (1.5, 1.0, 1.0)])
 def test_vibration_grows_with_the_load_at_once_and_falls_as_it_is_seen_to(before, now, shakes):
     # Given four seconds of noise at one load, then a sample at another
