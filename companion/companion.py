@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from companion.core import NOTHING, Core, FlightCore
+from companion.flight.core import NOTHING, Core
+from companion.flight.machine import FlightCore
 from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
 from companion.flight.states import State
@@ -27,7 +28,7 @@ class StepResult(NamedTuple):
     events: tuple[Event, ...]
 
 
-CoreT = TypeVar("CoreT", bound=Core[Any, Any])
+CoreT = TypeVar("CoreT", bound=Core[Any])
 
 
 class Stepped(Generic[CoreT]):
@@ -113,7 +114,7 @@ class Stepped(Generic[CoreT]):
         core, vehicle = self.core, self.core.flight.vehicle
         latest = vehicle.history.latest
         return Status(
-            state=core.machine.state.value,
+            state=core.state.value,
             vehicle_mode=vehicle.mode_name,
             armed=vehicle.armed is True,
             position_ned_m=None if latest is None else latest.position_ned_m,
@@ -139,7 +140,7 @@ class Companion(Stepped[FlightCore]):
 
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
-        return self.core.machine.state is State.READY and not self.plan_is_confirmed
+        return self.core.state is State.READY and not self.plan_is_confirmed
 
     def plan_text(self) -> str:
         """The plan for a person to agree to; complete once `plan_is_ready`."""
@@ -163,7 +164,7 @@ class Companion(Stepped[FlightCore]):
         core, flight = self.core, self.core.flight
         return FlightReport(
             outcome=flight.outcome or "aborted",
-            reason=flight.reason or f"still in state {core.machine.state.value}",
+            reason=flight.reason or f"still in state {core.state.value}",
             autopilot=flight.vehicle.autopilot_text(),
             stream_rates_hz=flight.streams.rates_hz(),
             collisions=core.collisions(),

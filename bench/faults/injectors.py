@@ -176,7 +176,7 @@ def _break(part: Any, method: str, error: Exception) -> None:
 
 def break_step(air: Air, error: Exception | None = None) -> None:
     """What the flight does next raises, once."""
-    _break(air.companion.core.machine, "step", error or _BrokenError("nobody thought of this"))
+    _break(air.companion.core, "_act", error or _BrokenError("nobody thought of this"))
 
 
 def break_encoder(air: Air) -> None:

@@ -130,7 +130,7 @@ class Air:
     @property
     def state(self) -> str:
         """The companion's."""
-        return self.companion.core.machine.state.value
+        return self.companion.core.state.value
 
     # --- the clock and the connection of the loop
 

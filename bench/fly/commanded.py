@@ -53,7 +53,7 @@ class Commanded(VirtualTime):
 
     @property
     def state(self) -> State:
-        state: State = self.guard.core.machine.state
+        state: State = self.guard.core.state
         return state
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.core import FlightCore
+from companion.flight.machine import FlightCore
 from companion.mavlink.packet import message_id_of, payload_of
 
 HEARTBEAT, MODE, COMMAND, SETPOINT = 0, 436, 76, 84

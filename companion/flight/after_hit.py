@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from companion.flight.context import BeforeHit, FlightContext, Target, Transition
-from companion.flight.states import TABLE, State, Trigger
+from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, WaitForItem
 from companion.mission.policy import OnCollision
 from companion.reflex.recovery.collision import recoveries_from
@@ -60,14 +60,11 @@ def lands_anyway(flight: FlightContext) -> bool:
     return flight.is_landing and recoveries_from(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
-# What leads from a recovery back to each state.
-_BACK_TO = {state: trigger for trigger, state in TABLE[State.RECOVERING].items()}
-
-
-def note_before(flight: FlightContext, state: State) -> None:
-    """Save the state before a hit is recorded. Within a recovery there is nothing to restore."""
-    before = BeforeHit(state, flight.step_index, replace(flight.tally), flight.after_recovery)
-    flight.before_hit = None if state is State.RECOVERING else before
+def note_before(flight: FlightContext, way_back: Transition | None) -> None:
+    """Save what a hit changes, and by what the flight goes on if it was none. Within a recovery nothing is restored."""
+    flight.before_hit = None
+    if way_back is not None:
+        flight.before_hit = BeforeHit(way_back, flight.step_index, replace(flight.tally), flight.after_recovery)
 
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
@@ -83,5 +80,4 @@ def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     flight.step_index = before.step_index
     flight.after_recovery = before.after_recovery
     flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
-    # A climb goes on as the mission's first item.
-    return Transition(_BACK_TO.get(before.state, Trigger.RECOVERED_TO_RETRY))
+    return before.way_back

@@ -1,13 +1,14 @@
 """What the parts of a flight share: the mission, the vehicle's state, messages to send and events."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from companion.autopilot.known import defaults
-from companion.flight.states import State, Trigger
+from companion.flight.states import Trigger
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
@@ -103,7 +104,7 @@ class StepTally:
 class BeforeHit:
     """The state before a hit, restored where the hit is rejected."""
 
-    state: State
+    way_back: Transition
     step_index: int
     tally: StepTally
     after_recovery: Transition
@@ -291,13 +292,24 @@ class FlightContext:
         return minus(local_ned_m, self.origin_ned_m or ZERO)
 
 
-class FixedSetpoint:
-    """Base of states whose setpoint does not move; without one none is sent."""
+FlightT = TypeVar("FlightT", bound=FlightContext)
+
+
+class Handler(ABC, Generic[FlightT]):
+    """What is done in a state; one is made each time the state is entered."""
 
     _target: Target | None = None
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def __init__(self, flight: FlightT, now_us: int) -> None:
+        """Begun now."""
+
+    def target(self, flight: FlightT, now_us: int) -> Target | None:
+        """The setpoint for now, which in most states does not move; None while none must be sent."""
         return self._target
+
+    @abstractmethod
+    def step(self, flight: FlightT, inputs: Inputs, now_us: int) -> Transition | None:
+        """Do what is due; a transition when the state is over."""
 
 
 def as_text(vector: Vector3) -> str:

@@ -4,7 +4,7 @@ from collections import deque
 
 from companion.autopilot.known import ASSUMED
 from companion.companion import StepResult
-from companion.core import POLL_INTERVAL_US
+from companion.flight.core import POLL_INTERVAL_US
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
@@ -71,7 +71,7 @@ class AttachedGuard(Guard):
             if is_for(packet, self._source[0]) and would_move(packet, self.core.flight.vehicle.autopilot):
                 self.hear_choice()
             return True
-        is_kept_out = self.core.machine.holds or self.core.flight.awaits_choice
+        is_kept_out = self.core.holds or self.core.flight.awaits_choice
         self.hear_setpoint(asked)
         self.kept_out += is_kept_out
         return not is_kept_out

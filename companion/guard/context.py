@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import defaults
-from companion.flight.context import FlightContext
+from companion.flight.context import FlightContext, Transition
 from companion.guard.config import GuardConfig
+from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks
 from companion.motion.vector import ZERO, minus, plus
 
@@ -23,9 +24,11 @@ class GuardContext(FlightContext):
 
     config: GuardConfig = field(kw_only=True)
     keeps_others_out: bool = field(kw_only=True)
+    after_recovery: Transition = field(default=Transition(Trigger.SETTLED))
     previous_mode: int | None = None
     is_to_hold: bool = False
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
+    was_met: bool = False  # since the guard began, and found fit to be guarded
     has_stood: bool = False  # on the ground, or disarmed, since the guard began
     awaits_choice: bool = False  # a program's setpoints are kept out until somebody chooses a mode
     left_alone: int = 0  # hits told, and left to the program that flies

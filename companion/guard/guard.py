@@ -7,7 +7,7 @@ from typing import Any
 from companion.companion import Stepped
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
-from companion.guard.core import GuardCore
+from companion.guard.machine import GuardCore
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, SendCommand
 from companion.motion.vector import ZERO, minus
@@ -23,7 +23,7 @@ class Guard(Stepped[GuardCore]):
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""
         vehicle = self.core.flight.vehicle
-        between.is_closed = self.core.machine.holds or self.core.begins_in_flight
+        between.is_closed = self.core.holds or self.core.begins_in_flight
         between.autopilot = vehicle.autopilot
         between.system_id = None if vehicle.identity is None else vehicle.identity.system_id
         if between.has_chosen:

@@ -1,36 +1,26 @@
 """The guard's states with its own setpoints: take over, recover, give back, and stand down for a pilot."""
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import FixedSetpoint, Inputs, Transition
+from companion.flight.context import Handler, Inputs, Transition
 from companion.flight.handlers.ending import silent_position
 from companion.flight.handlers.recovering import Recover
 from companion.guard.context import GuardContext
 from companion.guard.onward import leads_into
 from companion.guard.states import Trigger
 from companion.guard.watching import OTHERS_STOPPED_US
+from companion.reflex.recovery.collision import recoveries_from
 
 # PX4 answers in 10 ms; when it does not take the mode its own action for lost setpoints is the next best.
 HAND_OVER_US = 500_000
 
 
-class Recovering:
-    """Until the vehicle rests clear of what it hit."""
-
-    def __init__(self, guard: GuardContext) -> None:
-        self._recover = Recover(guard)
-        self.target = self._recover.target
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
-        # Over it is also where the hit was none.
-        is_over = self._recover.step(guard, inputs, now_us) is not None
-        return Transition(Trigger.SETTLED) if is_over else None
-
-
-class TakeOver(Recovering):
+class TakeOver(Recover[GuardContext]):
     """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
-        super().__init__(guard)
+        super().__init__(guard, now_us)
+        mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
+        guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
             guard.count_asked_mode()
@@ -58,7 +48,7 @@ class TakeOver(Recovering):
         return None
 
 
-class GiveBack(FixedSetpoint):
+class GiveBack(Handler[GuardContext]):
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
     The first is asked for straight after a report of the present one: a person's own request that shows there is not
@@ -69,7 +59,11 @@ class GiveBack(FixedSetpoint):
     """
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
-        previous = guard.previous_mode
+        previous, limit, hits = guard.previous_mode, guard.config.max_hits, recoveries_from(guard.hits)
+        if hits >= limit and not guard.is_to_hold:
+            guard.is_to_hold = True
+            if guard.config.then == "previous":
+                guard.report(now_us, "not_back", f"not given back: recovery {hits} of at most {limit}")
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.is_to_hold and previous is not None:
             self._wishes.append(previous)
@@ -129,7 +123,7 @@ class GiveBack(FixedSetpoint):
         return self.step(guard, Inputs(positions=inputs.positions), now_us)
 
 
-class StandDown(FixedSetpoint):
+class StandDown(Handler[GuardContext]):
     """A pilot who moved the sticks is given the position mode, as PX4's own stick override does.
 
     OFFBOARD would go on without a word of the pilot's otherwise. Setpoints go on until the mode is seen.

@@ -1,24 +1,28 @@
-"""Runs the guard's table: looks for triggers, moves between states, makes each state's activity."""
+"""The guard's core: what of a step is its own, and what is done in which state (see flight.core)."""
 
 import math
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from companion.flight.after_hit import note_before
-from companion.flight.context import Inputs, Transition
+from companion.flight.context import Handler, Inputs, Transition
+from companion.flight.core import Core
 from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.handlers.ending import LINK_RESTORED, Released, silent_link, silent_position, taken_by
-from companion.flight.handlers.recovering import record_collision
-from companion.flight.machine import StateMachine
-from companion.flight.states import State as FlightState
+from companion.flight.handlers.recovering import Recover, record_collision
+from companion.flight.vehicle_update import situation_of
+from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
-from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
+from companion.guard.holding import GiveBack, StandDown, TakeOver
 from companion.guard.onward import lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
-from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down
-from companion.messages import Asked, Sticks
-from companion.reflex.detection.detector import ImpactKind
-from companion.reflex.recovery.collision import recoveries_from
+from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down, observe, why_not
+from companion.messages import Asked, LandedState, Sample, Sticks, TimeSync
+from companion.motion.resets import Resets
+from companion.motion.vector import plus
+from companion.reflex.detection.detector import ImpactKind, Situation
+from companion.reflex.recovery.collision import CollisionReport
 
 # What is told of a move that has a story.
 _KINDS = {
@@ -36,41 +40,102 @@ _KINDS = {
 STICKS = "the pilot moved the sticks"
 # After these the vehicle is given back to hold whatever is configured.
 _TO_HOLD = (Trigger.STOPPED, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT)
+# What is done in each state; a pilot's is begun with more, see `GuardCore._enter`.
+HANDLERS: Mapping[State, Callable[[Any, int], Handler[Any]]] = {
+    State.CONNECTING: GuardConnect,
+    State.STANDING_BY: StandBy,
+    State.WATCHING: Watching,
+    State.TAKING_OVER: TakeOver,
+    State.RECOVERING: Recover[GuardContext],
+    State.GIVING_BACK: GiveBack,
+    State.CRASHED: Crashed,
+    State.ENDED: Released,
+}
 
-# What is done in a state; one object is made each time the state is entered (see flight.machine).
-Handler: TypeAlias = (
-    GuardConnect | StandBy | Watching | TakeOver | Recovering | GiveBack | StandDown | Crashed | Released
-)
 
-
-@dataclass
-class GuardMachine(StateMachine):
-    """The present state and what is being done in it."""
-
+class GuardCore(Core[GuardContext]):
     program = "guard"
     table = TABLE
+    handlers = HANDLERS
+    stopping = Trigger.STOPPED
     giving_away = (State.GIVING_BACK,)
-    flight: GuardContext
-    handler: Handler
     state: State = State.CONNECTING
-    judged: Asked | None = None  # the program's setpoint that was last looked at
+    is_enabled = False  # asked for, and not yet taken up
+    _judged: Asked | None = None  # the program's setpoint that was last looked at
+
+    def __init__(self, config: GuardConfig) -> None:
+        super().__init__(GuardContext(config.as_mission(), config=config, keeps_others_out=bool(config.between)))
 
     @property
     def holds(self) -> bool:
         return self.state in HOLDING or (isinstance(self.handler, StandDown) and self.handler.hands_over)
 
     @property
-    def finished(self) -> bool:
+    def is_over(self) -> bool:
         return self.state is State.ENDED
 
-    def step(self, inputs: Inputs, now_us: int) -> bool:
-        before = self.handler
-        if (asked := self._from_outside(inputs, now_us)) is not None:
-            self._take(asked, now_us)
+    @property
+    def _is_active(self) -> bool:
+        return self.state is not State.CONNECTING
+
+    @property
+    def _setpoint_hz(self) -> float:
+        return super()._setpoint_hz if self.holds else self.flight.config.lead_hz
+
+    def situation(self) -> Situation:
+        """Ground, take-off and landing look like a hit. Whoever flies may go down, while the guard does not."""
+        guard, state, holds = self.flight, self.state, self.holds
+        off_state = None if state is State.WATCHING or state in HOLDING else why_not(guard) or state.value
+        return situation_of(guard, off_state, not holds and goes_down(guard, self.now_us), holds)
+
+    def collisions(self) -> tuple[CollisionReport, ...]:
+        """All so far, in the vehicle's present local frame."""
+        shift = self.resets.shift_ned_m
+        return tuple(
+            replace(
+                hit,
+                position_ned_m=plus(hit.position_ned_m, 1.0, shift),
+                recovery_setpoint_ned_m=plus(hit.recovery_setpoint_ned_m, 1.0, shift),
+            )
+            for hit in super().collisions()
+        )
+
+    @property
+    def begins_in_flight(self) -> bool:
+        """Whether a guard in between has met no vehicle before, and this one may fly by a program's setpoints."""
+        guard, handler = self.flight, self.handler
+        is_first = isinstance(handler, GuardConnect) and handler.begins
+        return is_first and bool(guard.config.between) and not guard.has_stood
+
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
+        if self.flight.keeps_others_out:
+            # A program behind the guard answers, by its own clock: two answers are two times.
+            samples = [one for one in samples if not isinstance(one, TimeSync) or one.answered_ns is not None]
+        return observe(self.flight, samples, now_us)
+
+    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
+        guard = self.flight
+        sticks = [sample for sample in samples if isinstance(sample, Sticks)]
+        if sticks and self.state not in HOLDING:
+            guard.sticks = sticks[-1]
+        elif sticks and guard.sticks is None:
+            # Nobody had a stick in hand before the hit.
+            guard.sticks = sticks[0]
+        if guard.vehicle.armed is False and self.resets.has_shifted:
+            # It may restart, and count its resets from zero.
+            self.resets = Resets()
+        inputs = inputs._replace(sticks=sticks, is_enabled=self.is_enabled)
+        guard.awaits_choice &= not self.is_enabled
+        self.is_enabled, held = False, self.holds
+        self._move(inputs, now_us)
+        self._await_choice(held, now_us)
+
+    def _move(self, inputs: Inputs, now_us: int) -> None:
+        """Take all moves that are due."""
+        self._take(self._from_outside(inputs, now_us), now_us)
         if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and goes_down(self.flight, now_us)
-            if (crash := crashed(self.flight, meant, now_us)) is not None:
-                self._take(crash, now_us)
+            self._take(crashed(self.flight, meant, now_us), now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
@@ -82,18 +147,13 @@ class GuardMachine(StateMachine):
                 is_first = self.state is State.WATCHING
                 if is_first:
                     self._remember_mode()
-                note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
+                note_before(self.flight, self.flight.after_recovery if is_first else None)
                 record_collision(self.flight, estimate, now_us)
                 self._take(Transition(Trigger.HIT), now_us)
-        if (transition := self._led_back() or self.handler.step(self.flight, inputs, now_us)) is not None:
-            self._take_all(transition, now_us)
-        return self.handler is not before
-
-    def _give_away(self, text: str, now_us: int) -> None:
-        self._take(Transition(Trigger.STOPPED, text), now_us)
+        self._take_all(self._led_back() or self.handler.step(self.flight, inputs, now_us), now_us)
 
     def _release(self, text: str) -> None:
-        self.state, self.handler, self.flight.reason = State.ENDED, Released(), text
+        self.state, self.handler, self.flight.reason = State.ENDED, Released(self.flight, self.now_us), text
 
     def _is_beside_program(self) -> bool:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
@@ -105,9 +165,9 @@ class GuardMachine(StateMachine):
         """A program that was given back to, and would hit the same again."""
         guard, asked = self.flight, self.flight.asked
         was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.flies_setpoints
-        if self.state is not State.WATCHING or not was_given or asked is None or asked is self.judged:
+        if self.state is not State.WATCHING or not was_given or asked is None or asked is self._judged:
             return None
-        self.judged = asked
+        self._judged = asked
         if not lead_into(guard, asked):
             return None
         self._remember_mode()
@@ -164,7 +224,7 @@ class GuardMachine(StateMachine):
             return None
         return Transition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
-    def _begin(self, previous: State, transition: Transition, now_us: int) -> Handler:
+    def _enter(self, previous: State, transition: Transition, now_us: int) -> Handler[Any]:
         guard, trigger = self.flight, Trigger[transition.trigger.name]
         if transition.text:
             guard.report(now_us, _KINDS.get(trigger, "guard"), transition.text)
@@ -174,35 +234,24 @@ class GuardMachine(StateMachine):
             guard.expected_mode = None
             if guard.collisions:
                 guard.collisions[-1].is_over = True
-        match self.state:
-            case State.CONNECTING:
-                guard.reflex.restart(now_us)
-                guard.vehicle.attitude_parameters.clear()
-                return GuardConnect(isinstance(self.handler, GuardConnect) and self.handler.is_first)
-            case State.STANDING_BY:
-                return StandBy()
-            case State.WATCHING:
-                return Watching()
-            case State.TAKING_OVER:
-                mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
-                guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
-                return TakeOver(guard, now_us)
-            case State.RECOVERING:
-                return Recovering(guard)
-            case State.GIVING_BACK:
-                limit, hits = guard.config.max_hits, recoveries_from(guard.hits)
-                if hits >= limit and not guard.is_to_hold:
-                    guard.is_to_hold = True
-                    if guard.config.then == "previous":
-                        guard.report(now_us, "not_back", f"not given back: recovery {hits} of at most {limit}")
-                return GiveBack(guard, now_us)
-            case State.STOOD_DOWN:
-                return StandDown(guard, transition.text.startswith(STICKS), now_us)
-            case State.CRASHED:
-                return Crashed(guard)
-            case State.ENDED:
-                guard.reason = transition.text
-                return Released()
+        if self.state is State.STOOD_DOWN:
+            return StandDown(guard, transition.text.startswith(STICKS), now_us)
+        if self.state is State.ENDED:
+            guard.reason = transition.text
+        return self.handlers[self.state](guard, now_us)
+
+    def _await_choice(self, held: bool, now_us: int) -> None:
+        """A program that flew into something would do it again by itself, and nobody would notice a hit: after a
+        restart of the guard, and where it has released a vehicle that flies setpoints on.
+        """
+        guard, vehicle = self.flight, self.flight.vehicle
+        releases = held and not self.holds and self.state is State.STOOD_DOWN
+        if vehicle.armed is False or vehicle.is_mode_chosen:
+            guard.awaits_choice = False
+        elif releases and guard.keeps_others_out and vehicle.flies_setpoints:
+            guard.await_choice("the guard has released the vehicle", now_us)
+        elif self.begins_in_flight and vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
+            guard.await_choice("begun in flight", now_us)
 
 
 def has_moved(before: Sticks, now: Sticks, override: float) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from companion.autopilot.interface import Pilot
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
+from companion.flight.context import Handler, Inputs, Target, Transition
 from companion.flight.envelope import unattended_text
 from companion.flight.handlers.connecting import Meet
 from companion.flight.vehicle_update import update_vehicle
@@ -96,41 +96,42 @@ def why_not(guard: GuardContext) -> str | None:
     return None if name in guard.config.modes else f"{name} is not among the modes that may be taken over"
 
 
-class GuardConnect(Meet):
+class GuardConnect(Meet[GuardContext]):
     """The vehicle may be flying.
 
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    def __init__(self, is_first: bool = True) -> None:
-        super().__init__()
-        self.is_first = is_first
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
+        super().__init__(guard, now_us)
+        self._is_first = not guard.was_met
 
     @property
     def begins(self) -> bool:
         """Whether no vehicle was met before, and it may yet be that this one can be guarded."""
-        return self.is_first and (self._requests is None or not self._is_told)
+        return self._is_first and (self._requests is None or not self._is_told)
 
-    def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
+    def _commands(self, guard: GuardContext) -> list[VehicleCommand]:
         echoes = set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ))
-        sticks = set_message_interval(flight.vehicle.autopilot.sticks_message, round(1e6 / STICKS_HZ))
-        return [*super()._commands(flight), echoes, sticks]
+        sticks = set_message_interval(guard.vehicle.autopilot.sticks_message, round(1e6 / STICKS_HZ))
+        return [*super()._commands(guard), echoes, sticks]
 
-    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        complaint = flight.streams.too_slow(flight.vehicle.autopilot) or flight.round_trip.complaint()
-        if complaint is not None and (flight.mission.companion.link.wait or not self.is_first):
-            self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
+    def _judge(self, guard: GuardContext, now_us: int) -> Transition | None:
+        complaint = guard.streams.too_slow(guard.vehicle.autopilot) or guard.round_trip.complaint()
+        if complaint is not None and (guard.mission.companion.link.wait or not self._is_first):
+            self._ask_again(guard, f"not guarded by now: {complaint}", now_us)
             return None
-        self._report_streams(flight, now_us)
-        unattended = unattended_text(flight.vehicle.autopilot, flight.mission.limits.max_speed_m_s)
-        flight.report(now_us, "unattended", unattended)
+        self._report_streams(guard, now_us)
+        unattended = unattended_text(guard.vehicle.autopilot, guard.mission.limits.max_speed_m_s)
+        guard.report(now_us, "unattended", unattended)
         return Transition(Trigger.CONNECTED) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 
-class StandBy(FixedSetpoint):
+class StandBy(Handler[GuardContext]):
     """Nothing to guard; the reason is reported when it changes."""
 
-    def __init__(self) -> None:
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
+        guard.was_met = True
         self._told: str | None = None
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
@@ -149,7 +150,7 @@ class StandBy(FixedSetpoint):
         return None
 
 
-class Watching:
+class Watching(Handler[GuardContext]):
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
     def target(self, guard: GuardContext, now_us: int) -> Target | None:

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from companion import messages
-from companion.core import POLL_INTERVAL_US
 from companion.flight.context import Inputs
+from companion.flight.core import POLL_INTERVAL_US
 from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.vehicle_update import note_height, situation_of
 from companion.guard.config import GuardConfig
@@ -51,7 +51,7 @@ class Circumstances:
         if self._wreck is not None and guard.is_wreck:
             self._wreck.step(guard, Inputs(), now_us)
         elif crashed(guard, goes_down(guard, now_us), now_us) is not None:
-            self._wreck = Crashed(guard)
+            self._wreck = Crashed(guard, now_us)
         happened = [event.text for event in guard.events if event.kind in _TOLD]
         if vehicle.armed and armed is not True:
             happened.append("armed")

@@ -187,7 +187,7 @@ class AttachedFlight(Watched):
     def fly_into_the_wall(self) -> None:
         self.take_off()
         self.fly_by(1.5)
-        self.run_until(lambda: self.guard.core.machine.holds, 20.0)
+        self.run_until(lambda: self.guard.core.holds, 20.0)
 
     def _exchange(self) -> None:
         self.take(self.guard.step(b"", self.now_us))

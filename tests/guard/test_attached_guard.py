@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from bench.fly import commanded
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
-from companion.core import POLL_INTERVAL_US
+from companion.flight.core import POLL_INTERVAL_US
 from companion.guard.onward import stop
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS

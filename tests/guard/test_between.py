@@ -58,7 +58,7 @@ def hit(flies: Callable[[BetweenFlight], None], parameters: dict[str, float] | N
     air = BetweenFlight(GuardConfig(**changes), parameters)
     air.take_off()
     flies(air)
-    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
+    air.run_until(lambda: air.guard.core.holds, 20.0)
     return air
 
 
@@ -172,7 +172,7 @@ def test_a_reset_of_the_position_moves_what_the_guard_holds():
     air = BetweenFlight(GuardConfig(), faults=[jump])
     air.take_off()
     by_places(air)
-    air.run_until(lambda: air.guard.core.machine.holds, 20.0)
+    air.run_until(lambda: air.guard.core.holds, 20.0)
     assert 14.5 < air.time_s < 15.7, "the estimate jumps while the guard holds"
     hit_ned_m = air.guard.core.collisions()[0].position_ned_m
     air.run_for(8.0)

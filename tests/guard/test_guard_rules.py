@@ -6,8 +6,7 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.px4.firmware import PX4
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, AUTO_PRECLAND, OFFBOARD, POSCTL
 from companion.guard.config import GuardConfig
-from companion.guard.core import GuardCore
-from companion.guard.machine import has_moved
+from companion.guard.machine import GuardCore, has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import goes_down, observe
 from companion.link.vehicle import ModeReport
@@ -57,12 +56,12 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
     core, ardupilot = GuardCore(GuardConfig(between=("udpin://:14540",))), Heartbeat(1, 1, 2, 3, False, 5, 3)
     for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
         core.advance(heard, now_us)
-    assert core.reflex.monitor.estimator.hides_clipping and core.machine.handler.begins
-    core.machine.state, core.flight.is_wreck, core.flight.fault = State.CRASHED, True, "of the guard's"
+    assert core.reflex.monitor.estimator.hides_clipping and core.handler.begins
+    core.state, core.flight.is_wreck, core.flight.fault = State.CRASHED, True, "of the guard's"
     core.advance((), 4 * SECOND)
-    assert core.machine.state is State.STANDING_BY and not core.flight.is_wreck
+    assert core.state is State.STANDING_BY and not core.flight.is_wreck
     core.advance((), 5 * SECOND)
-    assert core.machine.finished
+    assert core.is_over
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16

@@ -1,40 +1,44 @@
 """States connect and ready: who is there, are its streams fast enough, does the person agree."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
 from itertools import chain
 
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
+from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Transition
 from companion.flight.handlers.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, VehicleCommand, request_message, set_message_interval
 
 
-class Meet(FixedSetpoint, ABC):
-    """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
+class Meet(Handler[FlightT]):
+    """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard.
 
-    def __init__(self) -> None:
-        self._started_us: int | None = None  # to look for a vehicle, then with it
+    Of a vehicle that has restarted nothing that was measured before is valid.
+    """
+
+    def __init__(self, flight: FlightT, now_us: int) -> None:
+        flight.reflex.restart(now_us)
+        flight.vehicle.attitude_parameters.clear()
+        self._started_us = now_us  # to look for a vehicle, then with it
         self._requests: Iterator[VehicleCommand] | None = None
         self._asked: float | None = None  # the last message
         self._measuring_since_us: int | None = None
         self._is_told = False  # what is waited for
 
     @abstractmethod
-    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
+    def _judge(self, flight: FlightT, now_us: int) -> Transition | None:
         """Once the streams have been measured."""
 
-    def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
+    def _commands(self, flight: FlightT) -> list[VehicleCommand]:
         """What is asked of a vehicle that has just been met."""
         requested = [stream.request() for stream in flight.streams.streams]
         return [request_message(MessageId.AUTOPILOT_VERSION), *requested, *flight.vehicle.autopilot.streams]
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+    def step(self, flight: FlightT, inputs: Inputs, now_us: int) -> Transition | None:
         identity, companion = flight.vehicle.identity, flight.mission.companion
         if identity is None:
             wait_s = companion.link.heartbeat_wait_s
-            self._started_us = now_us if self._started_us is None else self._started_us
             if self._is_told or now_us - self._started_us < wait_s * 1e6:
                 return None
             text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
@@ -58,7 +62,7 @@ class Meet(FixedSetpoint, ABC):
         too_old = flight.vehicle.version_complaint()
         return self._judge(flight, now_us) if too_old is None else Transition(Trigger.REFUSED, too_old)
 
-    def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
+    def _ask(self, flight: FlightT, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
         outcome, imu = flight.command_outcome(inputs, False, now_us), flight.vehicle.autopilot.lesser_imu
         has_none = outcome is not None and outcome.refused and self._asked == MessageId.HIGHRES_IMU
@@ -77,26 +81,25 @@ class Meet(FixedSetpoint, ABC):
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
 
-    def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
+    def _ask_again(self, flight: FlightT, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""
         if not self._is_told:
             self._is_told = True
             flight.report(now_us, "link", text)
         self._requests, self._measuring_since_us = iter(self._commands(flight)), None
 
-    def _report_streams(self, flight: FlightContext, now_us: int) -> None:
+    def _report_streams(self, flight: FlightT, now_us: int) -> None:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         window_s = flight.mission.companion.streams.window_s
         flight.report(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
 
 
-class Connect(Meet):
+class Connect(Meet[FlightContext]):
     """On the ground, with a vehicle that nobody flies."""
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         too_slow, link = flight.streams.too_slow(flight.vehicle.autopilot), flight.mission.companion.link
-        assert self._started_us is not None, "somebody has been met"
         # A vehicle that has just started sends some of them later.
         may_wait = link.wait or now_us - self._started_us < link.heartbeat_wait_s * 1e6
         if too_slow is not None and may_wait:
@@ -107,7 +110,7 @@ class Connect(Meet):
         return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 
-class Ready(FixedSetpoint):
+class Ready(Handler[FlightContext]):
     """Show the plan; nothing happens until it is confirmed."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:

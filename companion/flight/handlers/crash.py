@@ -2,7 +2,7 @@
 
 import math
 
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Transition
+from companion.flight.context import FlightContext, Handler, Inputs, Transition
 from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import DISARM, DISARM_BY_FORCE
@@ -52,7 +52,7 @@ def _is_pressed(flight: FlightContext, now_us: int) -> bool:
     return is_late and recovery is not None and recovery.is_pressed
 
 
-class Crashed(FixedSetpoint):
+class Crashed(Handler[FlightContext]):
     """Until it is disarmed, or flies again in other hands. No setpoint is sent to a vehicle that lies or tumbles.
 
     One that lies is asked to disarm where `on_crash` says so, never one that may fly. PX4 refuses where it does not
@@ -60,7 +60,7 @@ class Crashed(FixedSetpoint):
     side or on its back.
     """
 
-    def __init__(self, flight: FlightContext) -> None:
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
         flight.command_client.cancel()
         flight.expected_mode, flight.is_wreck = None, True
         self._place_ned_m = flight.latest.position_ned_m

@@ -3,7 +3,7 @@
 import math
 from typing import Literal
 
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition
+from companion.flight.context import FlightContext, Handler, Inputs, Target, Transition
 from companion.flight.states import ON_THE_WAY, State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.messages import DISARM, LandedState, Vector3
@@ -181,7 +181,7 @@ def taken_by(flight: FlightContext, requested_mode: int | None) -> Literal["fail
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
-class Released(FixedSetpoint):
+class Released(Handler[FlightContext]):
     """Nothing more to do: somebody else has the vehicle, or it was never taken."""
 
     finished = True
@@ -190,7 +190,7 @@ class Released(FixedSetpoint):
         return None
 
 
-class HandOver:
+class HandOver(Handler[FlightContext]):
     """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
 
     The mode is requested straight after a report of the present one, so that a takeover before it is seen first. A

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from companion.flight import expectations
-from companion.flight.context import TURNING_RAD_S, FlightContext, Inputs, StepTally, Target, Transition
+from companion.flight.context import TURNING_RAD_S, FlightContext, Handler, Inputs, StepTally, Target, Transition
 from companion.flight.handlers.takeoff_and_landing import rests
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
@@ -32,7 +32,7 @@ _TRIGGERS = {
 }
 
 
-class _OnTrajectory:
+class _OnTrajectory(Handler[FlightContext]):
     """A trajectory in mission coordinates, begun at a time of the trajectories' clock."""
 
     _trajectory: Trajectory
@@ -231,7 +231,7 @@ class FlyItems(_OnTrajectory):
         return None
 
 
-class HoldAfterRecovery:
+class HoldAfterRecovery(Handler[FlightContext]):
     """Stay at the recovery setpoint for the policy's time."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:

@@ -1,7 +1,7 @@
 """State recovering: asks the reflex for the way to rest, and tells how it goes."""
 
 from companion.flight.after_hit import take_back
-from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.recovery import Progress
@@ -33,15 +33,15 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     )
 
 
-class Recover:
+class Recover(Handler[FlightT]):
     """Fly to rest after the newest collision, and wait until the vehicle has settled."""
 
-    def __init__(self, flight: FlightContext) -> None:
+    def __init__(self, flight: FlightT, now_us: int) -> None:
         assert flight.reflex.recovery is not None, "a collision begins one"
         self._recovery = flight.reflex.recovery
         self._first_hit = flight.reflex.in_one_recovery()[-1]
 
-    def target(self, flight: FlightContext, now_us: int) -> Target | None:
+    def target(self, flight: FlightT, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
         place = self._recovery.record.setpoint_ned_m
         yaw_rad = flight.heading_towards()
@@ -50,7 +50,7 @@ class Recover:
         acceleration, lean = flight.reflex.lean()
         return Target(place, yaw_rad, None, acceleration, lean)
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+    def step(self, flight: FlightT, inputs: Inputs, now_us: int) -> Transition | None:
         for sample in inputs.positions:
             shown = self._recovery.take(sample)
             transition = take_back(flight, now_us) if shown.is_rejected else None
@@ -66,7 +66,7 @@ class Recover:
             return self._leave(flight)
         return None
 
-    def _tell(self, flight: FlightContext, shown: Progress, now_us: int) -> None:
+    def _tell(self, flight: FlightT, shown: Progress, now_us: int) -> None:
         record, place = self._recovery.record, self._recovery.record.setpoint_ned_m
         if shown.rested_s is not None:
             text = f"at rest; by position from here on, {shown.rested_s:.2f} s after the hit"
@@ -82,7 +82,7 @@ class Recover:
             text += "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
             flight.report(now_us, "recovered", text, settled_after_s=shown.settled_s, overshoot_m=past_m)
 
-    def _leave(self, flight: FlightContext) -> Transition:
+    def _leave(self, flight: FlightT) -> Transition:
         """What follows begins at rest at the setpoint."""
         self._recovery.record.is_over = True
         flight.target = Target(self._recovery.record.setpoint_ned_m, flight.yaw_rad)

@@ -2,7 +2,7 @@
 
 import math
 
-from companion.flight.context import FixedSetpoint, FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.context import FlightContext, Handler, Inputs, Target, Transition, as_text
 from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
@@ -28,10 +28,12 @@ MOST_AHEAD_M = 0.15
 ARRIVES_M_S = 0.2
 
 
-class TakeOff:
+class TakeOff(Handler[FlightContext]):
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
-    def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        item = flight.steps[0].action
+        assert isinstance(item, TakeoffItem), "the mission model sees to it"
         self._item = item
         # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
         self._now = self._lead
@@ -163,7 +165,7 @@ def rests(flight: FlightContext, near: Lasting, goal_ned_m: Vector3) -> bool:
     return near.lasts_us >= config.settled.duration_s * 1e6
 
 
-class Land(FixedSetpoint):
+class Land(Handler[FlightContext]):
     """Rest at the last setpoint, ask for the mode, keep the setpoints going until the vehicle has it, then wait.
 
     One that is asked to land in motion lands where it comes to rest, be it outside the fence. One that is hurt, or near
@@ -215,18 +217,19 @@ class Land(FixedSetpoint):
 LEAD_US = 40_000
 
 
-class TakeBack(Recover):
-    """A recovery out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
+class RecoverInOffboard(Recover[FlightContext]):
+    """Out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
 
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        super().__init__(flight)
-        self._is_taken = False
+        super().__init__(flight, now_us)
+        offboard = flight.vehicle.autopilot.setpoints
+        self._is_taken = flight.own_modes == (offboard, None)
         # Of a second hit the first one's request may be on its way.
-        self._is_asked = flight.command_client.requested_mode == flight.vehicle.autopilot.setpoints
-        is_led = self._is_asked or flight.expected_mode == flight.vehicle.autopilot.setpoints
+        self._is_asked = flight.command_client.requested_mode == offboard
+        is_led = self._is_asked or flight.expected_mode == offboard
         self._ask_us = now_us + (0 if is_led else LEAD_US)
         if not self._is_asked:
             flight.count_asked_mode()

@@ -207,7 +207,7 @@ def breaks(*arguments):
     raise ArithmeticError("the sum is not the sum")
 
 
-ON_THE_WAY_OUT = ["companion.core.bounded", "companion.core.status_text"]
+ON_THE_WAY_OUT = ["companion.flight.core.bounded", "companion.flight.core.status_text"]
 ON_THE_WAY_OUT += ["companion.mavlink.encode.Encoder._position"]
 
 

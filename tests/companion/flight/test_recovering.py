@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from companion.core import Limiter
 from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.core import Limiter
 from companion.flight.envelope import SetpointError
 from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
@@ -66,7 +66,7 @@ def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
     reflex, mission = flight.reflex, flight.mission
     how = reflex.law, mission.recovery, mission.companion.settled
     reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, reflex.keeps_trim)
-    return Recover(flight)
+    return Recover(flight, 0)
 
 
 def hears(

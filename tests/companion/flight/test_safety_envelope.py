@@ -15,9 +15,9 @@ from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import made
 from companion.autopilot.px4.firmware import PX4
-from companion.core import Limiter
 from companion.fence import Fence
 from companion.flight.context import Target
+from companion.flight.core import Limiter
 from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded, unattended_text
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines

@@ -5,20 +5,19 @@ replayed.
 """
 
 import math
+import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from enum import Enum
+from typing import Any, ClassVar, Generic
 
-from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition
 from companion.flight.damage import note_motors
 from companion.flight.envelope import Surroundings, bounded
-from companion.flight.handlers.connecting import Connect
-from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.states import FINAL_STATES, IN_THE_AIR, ON_THE_WAY, State
-from companion.flight.vehicle_update import note_height, situation_of, update_vehicle
+from companion.flight.vehicle_update import note_height
 from companion.link.commands import CommandClient
 from companion.messages import (
     CommandAck,
@@ -29,7 +28,6 @@ from companion.messages import (
     PositionSetpoint,
     Sample,
 )
-from companion.mission.model import Mission
 from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import AWAY_M_S2, HELD_S, LEAD_S, NOTICED_S
@@ -54,16 +52,21 @@ class Outputs:
 NOTHING = Outputs((), ())
 
 
-FlightT = TypeVar("FlightT", bound=FlightContext)
-MachineT = TypeVar("MachineT", bound=StateMachine)
-
-
-class Core(ABC, Generic[FlightT, MachineT]):
+class Core(ABC, Generic[FlightT]):
     """The state between two steps, and the part of a step that a flight and a guard share."""
 
-    def __init__(self, flight: FlightT, machine: MachineT) -> None:
-        self.flight, self.machine, self.reflex = flight, machine, flight.reflex
-        self.started_at_us = self.now_us = 0
+    program: ClassVar[str]
+    table: ClassVar[Mapping[Any, Mapping[Any, Any]]]
+    handlers: ClassVar[Mapping[Any, Callable[[Any, int], Handler[Any]]]]
+    """Of all states that need no more to begin than the time."""
+    stopping: ClassVar[Enum]
+    """The trigger that gives the vehicle away."""
+    giving_away: ClassVar[tuple[Enum, ...]]
+    """States in which it is given away already."""
+    state: Any
+
+    def __init__(self, flight: FlightT) -> None:
+        self.flight, self.reflex = flight, flight.reflex
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = 0
         self._sample_boot_us = 0
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
@@ -71,6 +74,17 @@ class Core(ABC, Generic[FlightT, MachineT]):
         self._law, self._is_met = CommandClient(), False
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
+        self.begin(0)
+
+    @property
+    @abstractmethod
+    def is_over(self) -> bool:
+        """Nothing is left to send."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vehicle flies, or is about to fly, by this program's setpoints; of a flight all are its own."""
+        return True
 
     @property
     @abstractmethod
@@ -89,7 +103,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def begin(self, now_us: int) -> None:
         """Before the first step: times count from now on."""
         self.started_at_us = self.now_us = now_us
-        self.reflex.restart(now_us)
+        self.handler = self.handlers[self.state](self.flight, now_us)
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
@@ -115,14 +129,30 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def fault(self, error: Exception, now_us: int) -> None:
         """Handle a fault after the state machine. The first hands the vehicle over; later ones change nothing."""
         if not self.flight.fault:
-            self.machine.fail(error, now_us)
+            self._fail(error, now_us)
+
+    def _fail(self, error: Exception, now_us: int) -> None:
+        """This program is at fault: give the vehicle away while that can still be done, and say what happened."""
+        flight = self.flight
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
+        flight.report(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
+        if flight.fault or self.state in self.giving_away:
+            self._release(text)
+        flight.fault = text
+        try:
+            self._take(Transition(self.stopping, text), now_us)
+        except Exception as second:
+            trace = "".join(traceback.format_exception(second))
+            flight.report(now_us, "fault", f"and again: {second}", traceback=trace)
+            self._release(text)
 
     def _react(self, samples: Sequence[Sample], now_us: int) -> bool:
-        """Detection and the state machine. Any exception hands the vehicle over and is reported.
+        """Detection and the state machine; whether that moved on. Any exception hands the vehicle over and is reported.
 
         Heartbeats, setpoints and the log go on meanwhile. After a fault hits are not detected any more.
         """
-        flight = self.flight
+        flight, before = self.flight, self.handler
         try:
             samples = self._in_one_frame(samples, now_us)
             refusal = self._hear(samples, now_us)
@@ -135,14 +165,14 @@ class Core(ABC, Generic[FlightT, MachineT]):
                     positions.append(sample)
                 elif isinstance(sample, CommandAck):
                     acks.append(sample)
-            moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
+            self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
             if not flight.vehicle.armed or MotorOutputs in map(type, samples):
                 note_motors(flight, samples, now_us)
         except Exception as error:
-            return self.machine.fail(error, now_us)
-        return moved
+            self._fail(error, now_us)
+        return self.handler is not before
 
     def _in_one_frame(self, samples: Sequence[Sample], now_us: int) -> Sequence[Sample]:
         """The samples in a local frame that does not jump when the estimator resets its position.
@@ -177,8 +207,33 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return reaction.collisions
 
     @abstractmethod
-    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
-        """Run the state machine; whether its state changed."""
+    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
+        """Take all moves that are due."""
+
+    @abstractmethod
+    def _enter(self, previous: Any, transition: Transition, now_us: int) -> Handler[Any]:
+        """What is done in the present state, which was entered by that transition."""
+
+    @abstractmethod
+    def _release(self, text: str) -> None:
+        """Even giving away fails: silence lets the vehicle's own failsafe act."""
+
+    def _take(self, transition: Transition | None, now_us: int) -> bool:
+        """Whether it moves on. A trigger counts by its name: a guard takes a flight's, too."""
+        if transition is None:
+            return False
+        ways = {trigger.name: state for trigger, state in self.table[self.state].items()}
+        if transition.trigger.name not in ways:
+            return False
+        previous, self.state = self.state, ways[transition.trigger.name]
+        self.handler = self._enter(previous, transition, now_us)
+        return True
+
+    def _take_all(self, transition: Transition | None, now_us: int) -> None:
+        """That one and all that follow from it in this step."""
+        while self._take(transition, now_us):
+            # The answers and positions of this step belong to the state that asked for them.
+            transition = self.handler.step(self.flight, Inputs(), now_us)
 
     @abstractmethod
     def situation(self) -> Situation:
@@ -195,7 +250,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not (moved or follows_imu) and now_us < self._setpoint_due_us:
             return
         sample_us = self._sample_boot_us = self.reflex.sample_boot_us
-        interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
+        interval_us, holds = round(1e6 / self._setpoint_hz), self.holds
         if not holds:
             self._change_law(None, now_us)
         due_us = self._setpoint_due_us + interval_us
@@ -205,7 +260,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not flight.vehicle.is_mode_known:
             return
         try:
-            target = self.machine.handler.target(flight, now_us)
+            target = self.handler.target(flight, now_us)
             if target is None:
                 if self._leans:
                     self._change_law(None, now_us)
@@ -295,11 +350,11 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
-        return self.machine.finished and self._law.pending is None
+        return self.is_over and self._law.pending is None
 
     def _beat(self, now_us: int) -> None:
         """Send the companion's HEARTBEAT until the end."""
-        if not self.machine.finished:
+        if not self.is_over:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
@@ -312,11 +367,11 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if operator.status_texts:
             told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
             going = [(kind, text) for kind, text in told if text is not None]
-            flight.outbox += texts.due(going, self.machine.finished, now_us)
-        if operator.values_hz and now_us >= self._values_due_us and not self.machine.finished:
+            flight.outbox += texts.due(going, self.is_over, now_us)
+        if operator.values_hz and now_us >= self._values_due_us and not self.is_over:
             self._values_due_us = now_us + round(1e6 / operator.values_hz)
             latest = flight.collisions[-1] if flight.collisions else None
-            flight.outbox += values(self.machine.state, self.reflex.monitor, latest, hits, now_us - self.started_at_us)
+            flight.outbox += values(self.state, self.reflex.monitor, latest, hits, now_us - self.started_at_us)
 
     def next_deadline_us(self) -> int:
         """When the next step is due if nothing arrives."""
@@ -330,35 +385,6 @@ class Core(ABC, Generic[FlightT, MachineT]):
     def collisions(self) -> tuple[CollisionReport, ...]:
         """All collisions so far."""
         return tuple(record.report() for record in self.flight.collisions)
-
-
-class FlightCore(Core[FlightContext, Machine]):
-    def __init__(self, mission: Mission) -> None:
-        flight = FlightContext(mission)
-        super().__init__(flight, Machine(flight, Connect()))
-
-    @property
-    def _is_active(self) -> bool:
-        return self.machine.state not in FINAL_STATES and self.flight.armed_at_us is not None
-
-    @property
-    def _has_floor(self) -> bool:
-        return self.machine.state in ON_THE_WAY
-
-    def situation(self) -> Situation:
-        state = self.machine.state
-        off_state = None if state in IN_THE_AIR else state.value
-        return situation_of(self.flight, off_state, state is State.LANDING, is_held=True)
-
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
-        return update_vehicle(self.flight, samples, now_us)
-
-    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
-        self.stop_reason = None
-        return self.machine.step(inputs, now_us)
-
-    def next_deadline_us(self) -> int:
-        return super().next_deadline_us() if self.stop_reason is None else self.now_us
 
 
 # A setpoint at the edge of the envelope may cross it fifty times a second.
