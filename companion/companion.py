@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from companion.flight.core import NOTHING, Core
+from companion.flight.core import Core
 from companion.flight.machine import FlightCore
 from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
@@ -53,7 +53,7 @@ class Stepped(Generic[CoreT]):
             if sample is not None:
                 samples.append(sample)
         # Most of what a vehicle sends is for others, and shows nothing.
-        outputs = core.advance(samples, now_us) if samples or core.is_due(now_us) else NOTHING
+        messages, events = core.advance(samples, now_us) if samples or core.is_due(now_us) else ([], [])
         identity = core.flight.vehicle.identity
         if identity is not None and not self._is_addressed:
             # From now on the vehicle alone is listened to and spoken to.
@@ -61,13 +61,13 @@ class Stepped(Generic[CoreT]):
             self._decoder.listen_to(identity.system_id, identity.component_id, identity.autopilot)
             self._encoder.speak_to(identity.system_id, identity.component_id, identity.autopilot)
         sent: list[bytes] = []
-        for message in outputs.messages:
+        for message in messages:
             # What cannot be packed is left out.
             try:
                 sent += self._encoder.packets(message)
             except Exception as error:
                 core.fault(error, now_us)
-        return StepResult(tuple(frames), tuple(sent), outputs.events)
+        return StepResult(tuple(frames), tuple(sent), tuple(events))
 
     def last_words(self) -> list[tuple[float, bytes]]:
         """What the vehicle has to be told if this program dies now, each so many seconds later."""

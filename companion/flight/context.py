@@ -298,6 +298,7 @@ FlightT = TypeVar("FlightT", bound=FlightContext)
 class Handler(ABC, Generic[FlightT]):
     """What is done in a state; one is made each time the state is entered."""
 
+    finished = False  # nothing is left to send
     _target: Target | None = None
 
     def __init__(self, flight: FlightT, now_us: int) -> None:

@@ -43,15 +43,6 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 POLL_INTERVAL_US = 50_000
 
 
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    messages: tuple[Outgoing, ...]
-    events: tuple[Event, ...]
-
-
-NOTHING = Outputs((), ())
-
-
 class Core(ABC, Generic[FlightT]):
     """The state between two steps, and the part of a step that a flight and a guard share."""
 
@@ -77,11 +68,6 @@ class Core(ABC, Generic[FlightT]):
         self.begin(0)
 
     @property
-    @abstractmethod
-    def is_over(self) -> bool:
-        """Nothing is left to send."""
-
-    @property
     def holds(self) -> bool:
         """Whether the vehicle flies, or is about to fly, by this program's setpoints; of a flight all are its own."""
         return True
@@ -105,7 +91,7 @@ class Core(ABC, Generic[FlightT]):
         self.started_at_us = self.now_us = now_us
         self.handler = self.handlers[self.state](self.flight, now_us)
 
-    def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
+    def advance(self, samples: Sequence[Sample], now_us: int) -> tuple[list[Outgoing], list[Event]]:
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
@@ -120,11 +106,8 @@ class Core(ABC, Generic[FlightT]):
                 self._inform(now_us)
             except Exception as error:
                 self.fault(error, now_us)
-        if not flight.outbox and not flight.events:
-            return NOTHING
-        outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
-        flight.outbox, flight.events = [], []
-        return outputs
+        sent, told, flight.outbox, flight.events = flight.outbox, flight.events, [], []
+        return sent, told
 
     def fault(self, error: Exception, now_us: int) -> None:
         """Handle a fault after the state machine. The first hands the vehicle over; later ones change nothing."""
@@ -244,19 +227,17 @@ class Core(ABC, Generic[FlightT]):
 
         An attitude is sent for each IMU sample.
         """
-        target = self.flight.target
+        flight, limiter, target = self.flight, self.limiter, self.flight.target
         leans = target is not None and target.lean is not None
-        follows_imu = leans and self.reflex.sample_boot_us != self._sample_boot_us
-        if not (moved or follows_imu) and now_us < self._setpoint_due_us:
+        is_at_once = moved or (leans and self.reflex.sample_boot_us != self._sample_boot_us)
+        if not is_at_once and now_us < self._setpoint_due_us:
             return
         sample_us = self._sample_boot_us = self.reflex.sample_boot_us
         interval_us, holds = round(1e6 / self._setpoint_hz), self.holds
         if not holds:
             self._change_law(None, now_us)
         due_us = self._setpoint_due_us + interval_us
-        is_on_time = not (moved or follows_imu) and due_us > now_us
-        self._setpoint_due_us = due_us if is_on_time else now_us + interval_us
-        flight, limiter = self.flight, self.limiter
+        self._setpoint_due_us = now_us + interval_us if is_at_once or due_us <= now_us else due_us
         if not flight.vehicle.is_mode_known:
             return
         try:
@@ -281,14 +262,11 @@ class Core(ABC, Generic[FlightT]):
             flight.target = target
             self._change_law(target.lean is not None, now_us)
 
-    def _change_law(self, leans: bool | None, now_us: int) -> None:
+    def _change_law(self, leans: bool | None, now_us: int, is_new: bool = False) -> None:
         """Tell the vehicle by what it is flown from now on; None: no more by this companion."""
-        if leans != self._leans:
-            self._leans = leans
-            self._tell_law(now_us)
-
-    def _tell_law(self, now_us: int) -> None:
-        told = self.flight.vehicle.autopilot.changed_law(self._leans)
+        if leans == self._leans and not is_new:
+            return
+        self._leans, told = leans, self.flight.vehicle.autopilot.changed_law(leans)
         self._law.cancel()
         if told is not None:
             self._law.begin(told)
@@ -298,7 +276,7 @@ class Core(ABC, Generic[FlightT]):
         """Until the vehicle has answered. It hears of it first when it is met: a companion may have died before."""
         if not self._is_met and self.flight.vehicle.identity is not None:
             self._is_met = True
-            self._tell_law(now_us)
+            self._change_law(self._leans, now_us, is_new=True)
         elif self._law.pending is not None:
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             send, outcome = self._law.step(acks, False, now_us)
@@ -350,11 +328,11 @@ class Core(ABC, Generic[FlightT]):
     @property
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
-        return self.is_over and self._law.pending is None
+        return self.handler.finished and self._law.pending is None
 
     def _beat(self, now_us: int) -> None:
         """Send the companion's HEARTBEAT until the end."""
-        if not self.is_over:
+        if not self.handler.finished:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
@@ -367,8 +345,8 @@ class Core(ABC, Generic[FlightT]):
         if operator.status_texts:
             told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
             going = [(kind, text) for kind, text in told if text is not None]
-            flight.outbox += texts.due(going, self.is_over, now_us)
-        if operator.values_hz and now_us >= self._values_due_us and not self.is_over:
+            flight.outbox += texts.due(going, self.handler.finished, now_us)
+        if operator.values_hz and now_us >= self._values_due_us and not self.handler.finished:
             self._values_due_us = now_us + round(1e6 / operator.values_hz)
             latest = flight.collisions[-1] if flight.collisions else None
             flight.outbox += values(self.state, self.reflex.monitor, latest, hits, now_us - self.started_at_us)

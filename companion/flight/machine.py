@@ -51,10 +51,6 @@ class FlightCore(Core[FlightContext]):
         super().__init__(FlightContext(mission))
 
     @property
-    def is_over(self) -> bool:
-        return isinstance(self.handler, Released | HandOver) and self.handler.finished
-
-    @property
     def _is_active(self) -> bool:
         return self.state not in FINAL_STATES and self.flight.armed_at_us is not None
 

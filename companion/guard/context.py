@@ -1,17 +1,11 @@
 """What the guard's parts share: a flight's context, and whose vehicle it was before."""
 
-import math
 from dataclasses import dataclass, field
 
-from companion.autopilot.known import defaults
 from companion.flight.context import FlightContext, Transition
 from companion.guard.config import GuardConfig
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks
-from companion.motion.vector import ZERO, minus, plus
-
-# Setpoints are lost when there is none for so long.
-LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
 
 
 @dataclass(slots=True)
@@ -39,25 +33,6 @@ class GuardContext(FlightContext):
     sticks_us: int | None = None  # when these were heard
     sinks_m_s: float = 0.0  # as its position control is asked for
     sinks_us: int | None = None  # when that was heard
-
-    def hear_setpoint(self, asked: Asked, now_us: int) -> None:
-        """A program's is on its way. A place without a velocity moves as it has moved since the one before."""
-        before, before_us = self.asked, self.others_setpoint_us
-        self.asked, self.others_setpoint_us = asked, now_us
-        if before is None or before.place_ned_m is None or asked.place_ned_m is None or before_us is None:
-            return
-        since_s = (now_us - before_us) * 1e-6
-        if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
-            velocity = plus(ZERO, 1.0 / since_s, minus(asked.place_ned_m, before.place_ned_m))
-            # What goes faster than a vehicle is the next place, and no motion.
-            if math.hypot(*velocity) <= self.mission.limits.max_speed_m_s:
-                self.asked = Asked(asked.place_ned_m, velocity)
-
-    def await_choice(self, why: str, now_us: int) -> None:
-        """Keep a program's setpoints out until somebody chooses a mode."""
-        if not self.awaits_choice:
-            self.awaits_choice = True
-            self.report(now_us, "not_back", f"{why}: a program's setpoints are kept out until somebody chooses a mode")
 
     def note_touchdown(self) -> None:
         """The ground is here: heights count from it."""

@@ -1,16 +1,21 @@
 """The guard as a step function: bytes and the time in, bytes and events out."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from typing import Any
 
+from companion.autopilot.known import defaults
 from companion.companion import Stepped
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.machine import GuardCore
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, SendCommand
-from companion.motion.vector import ZERO, minus
+from companion.motion.vector import ZERO, minus, plus
+
+# Setpoints are lost when there is none for so long.
+LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
 
 
 class Guard(Stepped[GuardCore]):
@@ -40,14 +45,26 @@ class Guard(Stepped[GuardCore]):
         between.intervals.clear()
 
     def hear_setpoint(self, asked: Asked) -> None:
-        """A client's, in the vehicle's own frame, has been on its way since the last step."""
-        shift = self.core.resets.shift_ned_m
+        """A client's, in the vehicle's own frame, has been on its way since the last step.
+
+        A place without a velocity moves as it has moved since the one before.
+        """
+        guard, shift, now_us = self.core.flight, self.core.resets.shift_ned_m, self.core.now_us
+        before, before_us = guard.asked, guard.others_setpoint_us
         if shift != self._shift_ned_m:
             # The frame has moved since the one before, and not the place.
-            self._shift_ned_m, self.core.flight.others_setpoint_us = shift, None
+            self._shift_ned_m, before_us = shift, None
         if asked.place_ned_m is not None:
             asked = replace(asked, place_ned_m=minus(asked.place_ned_m, shift))
-        self.core.flight.hear_setpoint(asked, self.core.now_us)
+        guard.asked, guard.others_setpoint_us = asked, now_us
+        if before is None or before.place_ned_m is None or asked.place_ned_m is None or before_us is None:
+            return
+        since_s = (now_us - before_us) * 1e-6
+        if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
+            velocity = plus(ZERO, 1.0 / since_s, minus(asked.place_ned_m, before.place_ned_m))
+            # What goes faster than a vehicle is the next place, and no motion.
+            if math.hypot(*velocity) <= guard.mission.limits.max_speed_m_s:
+                guard.asked = replace(asked, velocity_ned_m_s=velocity)
 
     def hear_choice(self) -> None:
         """A client has asked for a mode."""

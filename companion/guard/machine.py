@@ -14,8 +14,7 @@ from companion.flight.handlers.recovering import Recover, record_collision
 from companion.flight.vehicle_update import situation_of
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
-from companion.guard.holding import GiveBack, StandDown, TakeOver
-from companion.guard.onward import lead_into, stop
+from companion.guard.holding import GiveBack, StandDown, TakeOver, lead_into, stop
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down, observe, why_not
 from companion.messages import Asked, LandedState, Sample, Sticks, TimeSync
@@ -71,10 +70,6 @@ class GuardCore(Core[GuardContext]):
         return self.state in HOLDING or (isinstance(self.handler, StandDown) and self.handler.hands_over)
 
     @property
-    def is_over(self) -> bool:
-        return self.state is State.ENDED
-
-    @property
     def _is_active(self) -> bool:
         return self.state is not State.CONNECTING
 
@@ -104,7 +99,7 @@ class GuardCore(Core[GuardContext]):
     def begins_in_flight(self) -> bool:
         """Whether a guard in between has met no vehicle before, and this one may fly by a program's setpoints."""
         guard, handler = self.flight, self.handler
-        is_first = isinstance(handler, GuardConnect) and handler.begins
+        is_first = isinstance(handler, GuardConnect) and not (guard.was_met or handler.is_unfit)
         return is_first and bool(guard.config.between) and not guard.has_stood
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -241,17 +236,21 @@ class GuardCore(Core[GuardContext]):
         return self.handlers[self.state](guard, now_us)
 
     def _await_choice(self, held: bool, now_us: int) -> None:
-        """A program that flew into something would do it again by itself, and nobody would notice a hit: after a
-        restart of the guard, and where it has released a vehicle that flies setpoints on.
+        """Keep a program's setpoints out until somebody chooses a mode: after a restart of the guard, and where it has
+        released a vehicle that flies setpoints on.
+
+        A program that flew into something would do it again by itself, and nobody would notice a hit.
         """
-        guard, vehicle = self.flight, self.flight.vehicle
-        releases = held and not self.holds and self.state is State.STOOD_DOWN
+        guard, vehicle, why = self.flight, self.flight.vehicle, ""
         if vehicle.armed is False or vehicle.is_mode_chosen:
             guard.awaits_choice = False
-        elif releases and guard.keeps_others_out and vehicle.flies_setpoints:
-            guard.await_choice("the guard has released the vehicle", now_us)
+        elif held and self.state is State.STOOD_DOWN and not self.holds:
+            why = "the guard has released the vehicle" if guard.keeps_others_out and vehicle.flies_setpoints else ""
         elif self.begins_in_flight and vehicle.armed and vehicle.landed is not LandedState.UNDEFINED:
-            guard.await_choice("begun in flight", now_us)
+            why = "begun in flight"
+        if why and not guard.awaits_choice:
+            guard.awaits_choice = True
+            guard.report(now_us, "not_back", f"{why}: a program's setpoints are kept out until somebody chooses a mode")
 
 
 def has_moved(before: Sticks, now: Sticks, override: float) -> bool:

@@ -102,14 +102,10 @@ class GuardConnect(Meet[GuardContext]):
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    def __init__(self, guard: GuardContext, now_us: int) -> None:
-        super().__init__(guard, now_us)
-        self._is_first = not guard.was_met
-
     @property
-    def begins(self) -> bool:
-        """Whether no vehicle was met before, and it may yet be that this one can be guarded."""
-        return self._is_first and (self._requests is None or not self._is_told)
+    def is_unfit(self) -> bool:
+        """Whether there is a vehicle, and it cannot be guarded by now."""
+        return self._requests is not None and self._is_told
 
     def _commands(self, guard: GuardContext) -> list[VehicleCommand]:
         echoes = set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ))
@@ -118,7 +114,7 @@ class GuardConnect(Meet[GuardContext]):
 
     def _judge(self, guard: GuardContext, now_us: int) -> Transition | None:
         complaint = guard.streams.too_slow(guard.vehicle.autopilot) or guard.round_trip.complaint()
-        if complaint is not None and (guard.mission.companion.link.wait or not self._is_first):
+        if complaint is not None and (guard.mission.companion.link.wait or guard.was_met):
             self._ask_again(guard, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(guard, now_us)

@@ -89,7 +89,7 @@ class CollisionGuard:
         with self._changed:
             self._guard.core.stop_reason = "stopped by the program"
             self._changed.notify_all()
-            self._changed.wait_for(lambda: self._guard.core.is_over or self._is_over, GIVING_BACK_US * 1e-6)
+            self._changed.wait_for(lambda: self._guard.core.handler.finished or self._is_over, GIVING_BACK_US * 1e-6)
             self._is_over = True
             self._changed.notify_all()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
@@ -226,7 +226,7 @@ class CollisionGuard:
                 with self._guarded():
                     self._send(self._guard.step(b"", self._clock.now_us()))
             until_us = self._faulty_until_us
-            if until_us is not None and (self._guard.core.is_over or self._clock.now_us() >= until_us):
+            if until_us is not None and (self._guard.core.handler.finished or self._clock.now_us() >= until_us):
                 # From here on the program's own setpoints pass.
                 self._is_over = True
                 self._changed.notify_all()

@@ -10,7 +10,7 @@ from bench.fly import commanded
 from bench.fly.commanded import HOLD, REPEATED_EVERY_S, SET_MODE
 from companion.autopilot.px4.modes import AUTO_LAND, AUTO_LOITER, OFFBOARD
 from companion.flight.core import POLL_INTERVAL_US
-from companion.guard.onward import stop
+from companion.guard.holding import stop
 from companion.guard.states import State
 from companion.mavlink.moves import SETPOINT_IDS
 from companion.mavlink.named import named, packet_from

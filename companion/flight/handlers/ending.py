@@ -202,7 +202,6 @@ class HandOver(Handler[FlightContext]):
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._began_us = now_us
         self._is_asked = False
-        self.finished = False
         self._target = None if flight.target is None else flight.target.at_rest()
         autopilot = flight.vehicle.autopilot
         self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
@@ -216,12 +215,15 @@ class HandOver(Handler[FlightContext]):
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> None:
-        if not self.finished and (self._taken_by_another(flight, now_us) or self._is_over(flight, inputs, now_us)):
+        if not self.finished and self._is_over(flight, inputs, now_us):
             self.finished = True
             flight.command_client.cancel()
 
     def _is_over(self, flight: FlightContext, inputs: Inputs, now_us: int) -> bool:
-        """Whether there is nothing left to ask for."""
+        """Whether there is nothing left to ask for, or another has taken the vehicle."""
+        if (holder := who_decided(flight, self._mode)) is not None:
+            flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
+            return True
         if self._disarming:
             if flight.command_outcome(inputs, False, now_us) is None:
                 return False
@@ -244,9 +246,3 @@ class HandOver(Handler[FlightContext]):
             flight.ask_for_mode(self._mode)
             return False
         return True
-
-    def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:
-        holder = who_decided(flight, self._mode)
-        if holder is not None:
-            flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
-        return holder is not None

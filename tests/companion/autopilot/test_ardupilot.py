@@ -331,7 +331,7 @@ def test_a_guard_inside_a_program_refuses_it():
     guard, heartbeat = AttachedGuard(GuardConfig(), 1), mav.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
     guard.step(heartbeat.pack(mav.MAVLink(None, 1, 1)), EPOCH_US)
     guard.step(b"", guard.next_deadline_us())
-    assert "PX4 alone" in guard.core.flight.reason and guard.core.is_over
+    assert "PX4 alone" in guard.core.flight.reason and guard.core.handler.finished
 
 
 # --- preflight
