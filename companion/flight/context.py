@@ -241,8 +241,7 @@ class FlightContext:
         return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s
 
     def may_command(self, now_us: int) -> bool:
-        """Whether a command to a held vehicle may be sent: not on an old mode report, as the pilot may have changed the
-        mode.
+        """Whether a held vehicle may be sent a command: not on an old report, as the pilot may have changed the mode.
 
         Into a silence it is sent once. A link cut in one direction delivers it; one cut in both loses it. A command
         that is not repeated does not arrive after a pilot's takeover.
@@ -253,16 +252,6 @@ class FlightContext:
         pending = self.command_client.pending
         is_unsaid = pending is not None and pending.attempts == 0
         return is_silent and self.vehicle.unconfirmed_mode is None and is_unsaid
-
-    def is_time_to_give_away(self, since_us: int, now_us: int) -> bool:
-        """Whether a mode that ends the holding may be requested: straight after a report of the mode.
-
-        A person's earlier request shows in that report, and is not overruled. Without a report the wait ends.
-        """
-        silent_us = now_us - self.vehicle.last_received_us
-        waited_s = (now_us - since_us) * 1e-6
-        is_over = silent_us >= OLD_NEWS_US or waited_s >= self.mission.companion.link.silence_s
-        return is_over or (self.vehicle.mode_received_us == now_us and self.vehicle.is_mode_known)
 
     def ask_for_mode(self, custom_mode: int) -> None:
         self.command_client.begin(self.vehicle.autopilot.set_mode(custom_mode))

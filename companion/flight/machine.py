@@ -75,7 +75,11 @@ class FlightCore(Core[FlightContext]):
         if flight.foreign_mode_since_us != self._away_us and flight.has_position and self.state in FOLLOWING:
             self._away_us = flight.foreign_mode_since_us
             if self._away_us is not None:
-                self._begin_here(now_us)
+                # On from where the vehicle is: it has stopped, and would chase its setpoint.
+                if isinstance(self.handler, FlyItems):
+                    self.handler.interrupt(flight)
+                flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
+                self.handler = self.handlers[self.state](flight, now_us)
         if self.state in IN_THE_AIR:
             self._take(crashed(flight, self.state is State.LANDING, now_us), now_us)
         for estimate in inputs.impacts:
@@ -90,14 +94,6 @@ class FlightCore(Core[FlightContext]):
         # A hit may be taken back until its recovery is over.
         if flight.expectations and self.state is not State.RECOVERING:
             expectations.review(flight, now_us)
-
-    def _begin_here(self, now_us: int) -> None:
-        """Go on from where the vehicle is: it has stopped, and would chase its setpoint."""
-        flight = self.flight
-        if isinstance(self.handler, FlyItems):
-            self.handler.interrupt(flight)
-        flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
-        self.handler = self.handlers[self.state](flight, now_us)
 
     def _release(self, text: str) -> None:
         self.handler = Released(self.flight, self.now_us)

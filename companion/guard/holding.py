@@ -7,7 +7,7 @@ import math
 
 from companion.autopilot.interface import Pilot
 from companion.flight.context import Handler, Inputs, Target, Transition
-from companion.flight.handlers.ending import silent_position
+from companion.flight.handlers.ending import GiveAway, silent_position
 from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import all_known
 from companion.guard.context import GuardContext
@@ -64,17 +64,18 @@ class TakeOver(Recover[GuardContext]):
         return None
 
 
-class GiveBack(Handler[GuardContext]):
-    """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
+class GiveBack(GiveAway[GuardContext]):
+    """Ask for one mode after the other until one is seen.
 
-    The first is asked for straight after a report of the present one: a person's own request that shows there is not
-    overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
+    A person's own request that crosses the first on the link, within its delay of about 10 ms, cannot be seen by
+    anybody.
 
     A program's own OFFBOARD needs no asking: its setpoints are let through again. When no mode is taken the setpoints
     stop, and PX4's action for lost setpoints follows.
     """
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
+        super().__init__(guard, now_us)
         previous, limit, hits = guard.previous_mode, guard.config.max_hits, recoveries_from(guard.hits)
         if hits >= limit and not guard.is_to_hold:
             guard.is_to_hold = True
@@ -84,9 +85,7 @@ class GiveBack(Handler[GuardContext]):
         if guard.config.then == "previous" and not guard.is_to_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
-        self._target = guard.target.at_rest() if guard.target else None
-        self._began_us = now_us
-        self._is_asked = self._is_told = False
+        self._is_told = False
         self._is_doubted = self.wish == previous  # whether it would hit again
 
     def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
@@ -117,12 +116,7 @@ class GiveBack(Handler[GuardContext]):
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._waits(guard, inputs, now_us):
             return None
-        if not self._is_asked:
-            if not guard.is_time_to_give_away(self._began_us, now_us):
-                return None
-            self._is_asked = True
-            guard.ask_for_mode(self.wish)
-        outcome = guard.command_outcome(inputs, guard.vehicle.custom_mode == self.wish, now_us)
+        outcome = self._ask_for(self.wish, guard, inputs, now_us)
         if outcome is None:
             return None
         if outcome.succeeded:

@@ -122,30 +122,26 @@ class GuardCore(Core[GuardContext]):
         inputs = inputs._replace(sticks=sticks, is_enabled=self.is_enabled)
         guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.holds
-        self._move(inputs, now_us)
-        self._await_choice(held, now_us)
-
-    def _move(self, inputs: Inputs, now_us: int) -> None:
-        """Take all moves that are due."""
         self._take(self._from_outside(inputs, now_us), now_us)
         if self.state in MAY_CRASH:
-            meant = self.state not in HOLDING and goes_down(self.flight, now_us)
-            self._take(crashed(self.flight, meant, now_us), now_us)
+            meant = self.state not in HOLDING and goes_down(guard, now_us)
+            self._take(crashed(guard, meant, now_us), now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over
             if self._is_beside_program():
-                self.flight.left_alone += 1
+                guard.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
-                self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
+                guard.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif Trigger.HIT in TABLE[self.state]:
                 is_first = self.state is State.WATCHING
                 if is_first:
                     self._remember_mode()
-                note_before(self.flight, self.flight.after_recovery if is_first else None)
-                record_collision(self.flight, estimate, now_us)
+                note_before(guard, guard.after_recovery if is_first else None)
+                record_collision(guard, estimate, now_us)
                 self._take(Transition(Trigger.HIT), now_us)
-        self._take_all(self._led_back() or self.handler.step(self.flight, inputs, now_us), now_us)
+        self._take_all(self._led_back() or self.handler.step(guard, inputs, now_us), now_us)
+        self._await_choice(held, now_us)
 
     def _release(self, text: str) -> None:
         self.state, self.handler, self.flight.reason = State.ENDED, Released(self.flight, self.now_us), text

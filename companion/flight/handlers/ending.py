@@ -3,9 +3,10 @@
 import math
 from typing import Literal
 
-from companion.flight.context import FlightContext, Handler, Inputs, Target, Transition
+from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition
 from companion.flight.states import ON_THE_WAY, State, Trigger
-from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
+from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS, CommandOutcome
+from companion.link.vehicle import OLD_NEWS_US
 from companion.messages import DISARM, LandedState, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
@@ -190,19 +191,38 @@ class Released(Handler[FlightContext]):
         return None
 
 
-class HandOver(Handler[FlightContext]):
-    """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
+class GiveAway(Handler[FlightT]):
+    """Ask for a mode straight after a report of the present one; setpoints go on until it is seen.
 
-    The mode is requested straight after a report of the present one, so that a takeover before it is seen first. A
-    later takeover counts, too. A vehicle that refuses to hold is asked to land. The setpoints stop when the command
-    client gives up (about 2.5 s without an answer), and after LONGEST_US at the latest. Then PX4's own loss-of-offboard
-    action takes over.
+    A person's earlier request shows in that report, and is not overruled. Without a report the wait ends.
+    """
+
+    def __init__(self, flight: FlightT, now_us: int) -> None:
+        self._began_us, self._is_asked = now_us, False
+        self._target = None if flight.target is None else flight.target.at_rest()
+
+    def _ask_for(self, mode: int, flight: FlightT, inputs: Inputs, now_us: int) -> CommandOutcome | None:
+        vehicle = flight.vehicle
+        if not self._is_asked:
+            is_told = vehicle.mode_received_us == now_us and vehicle.is_mode_known
+            is_old = now_us - vehicle.last_received_us >= OLD_NEWS_US
+            if not (is_told or is_old or (now_us - self._began_us) * 1e-6 >= flight.mission.companion.link.silence_s):
+                return None
+            self._is_asked = True
+            flight.ask_for_mode(mode)
+        return flight.command_outcome(inputs, vehicle.custom_mode == mode, now_us)
+
+
+class HandOver(GiveAway[FlightContext]):
+    """Disarm if the climb has not begun, then request the mode.
+
+    A takeover before the request is seen first. A later one counts, too. A vehicle that refuses to hold is asked to
+    land. The setpoints stop when the command client gives up (about 2.5 s without an answer), and after LONGEST_US at
+    the latest. Then PX4's own loss-of-offboard action takes over.
     """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        self._began_us = now_us
-        self._is_asked = False
-        self._target = None if flight.target is None else flight.target.at_rest()
+        super().__init__(flight, now_us)
         autopilot = flight.vehicle.autopilot
         self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
@@ -229,12 +249,7 @@ class HandOver(Handler[FlightContext]):
                 return False
             self._disarming = False
             inputs = Inputs()
-        if not self._is_asked:
-            if not flight.is_time_to_give_away(self._began_us, now_us):
-                return False
-            self._is_asked = True
-            flight.ask_for_mode(self._mode)
-        outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
+        outcome = self._ask_for(self._mode, flight, inputs, now_us)
         if outcome is None:
             return False
         if outcome.succeeded:
