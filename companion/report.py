@@ -53,12 +53,7 @@ class FlightReport:
 
     `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused), or it ended as it should
     but not as the mission expected (`expectations`). `aborted`: it began, or was stopped by the person, and ended
-    before the mission did. `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission
-    coordinates. `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits,
-    in mission coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
-    `refused_messages` counts the vehicle's messages that were not accepted, by name. `unconfirmed` counts the hits that
-    were none: one sample showed them, and nothing else. `round_trip_ms` is as summary.json has it. `promise` is the
-    detector's, when it was last armed. `crashed` says how; empty of a vehicle that has not.
+    before the mission did.
     """
 
     outcome: Outcome
@@ -66,15 +61,15 @@ class FlightReport:
     autopilot: str
     stream_rates_hz: Mapping[str, float]
     collisions: tuple[CollisionReport, ...]
-    origin_ned_m: Vector3 | None
+    origin_ned_m: Vector3 | None  # the arming position in the vehicle's local NED: the zero of mission coordinates
     started_at_us: int
     ended_at_us: int
     armed_at_us: int | None
     expectations: tuple[ExpectationReport, ...] = ()
-    obstacles: tuple[Patch, ...] = ()
-    unreachable: tuple[str, ...] = ()
-    refused_messages: Mapping[str, int] = field(default_factory=dict)
-    unconfirmed: int = 0
-    round_trip_ms: Mapping[str, float | None] = field(default_factory=dict)
-    promise: Promise | None = None
-    crashed: str = ""
+    obstacles: tuple[Patch, ...] = ()  # known at the end, from before and from this flight's hits; mission coordinates
+    unreachable: tuple[str, ...] = ()  # labels of items, or "home", to which that left no way
+    refused_messages: Mapping[str, int] = field(default_factory=dict)  # the vehicle's that were not accepted, by name
+    unconfirmed: int = 0  # hits that were none: one sample showed them, and nothing else
+    round_trip_ms: Mapping[str, float | None] = field(default_factory=dict)  # as summary.json has it
+    promise: Promise | None = None  # the detector's, when it was last armed
+    crashed: str = ""  # how; empty of a vehicle that has not

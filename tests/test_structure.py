@@ -240,11 +240,11 @@ DERIVED = {
     "reflex/detection/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/detection/monitor.py": {3},  # shown decimals
     "reflex/detection/health.py": {3, 3600},  # shown decimals; seconds an hour
-    "flight/damage.py": {3},  # shown decimals
+    "flight/after_hit.py": {3},  # shown decimals
 }
 # A damaged motor decides no hit and no recovery.
 OTHERS = {"motors.py"}
-FLIGHT = ("after_hit", "damage", "handlers/recovering")
+FLIGHT = ("after_hit", "handlers/recovering")
 HEART = [path for room in ("motion", "reflex") for path in sorted((COMPANION / room).rglob("*.py"))]
 HEART += [COMPANION / "flight" / f"{name}.py" for name in FLIGHT]
 WITH_NUMBERS = [path for path in HEART if path not in CONFIGS and path.name not in OTHERS]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, ClassVar, Generic
 
+from companion.flight.after_hit import note_motors
 from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition
-from companion.flight.damage import note_motors
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
@@ -141,13 +141,8 @@ class Core(ABC, Generic[FlightT]):
             refusal = self._hear(samples, now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
-            acks: list[CommandAck] = []
-            positions: list[LocalPosition] = []
-            for sample in samples:
-                if isinstance(sample, LocalPosition):
-                    positions.append(sample)
-                elif isinstance(sample, CommandAck):
-                    acks.append(sample)
+            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
+            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
@@ -180,9 +175,7 @@ class Core(ABC, Generic[FlightT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        is_blind = self.reflex.monitor.no_data_reason is not None
-        if is_blind or flight.blind.since_us is not None:
-            flight.blind.update(is_blind, now_us)
+        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:

@@ -32,9 +32,7 @@ class KnownSurface:
     reach_m: float = 0.0
 
     def is_ahead(self, start_ned_m: Vector3, end_ned_m: Vector3) -> bool:
-        """Whether it is in the way: the start is not behind it, and start or end lies in front of it, not past its
-        end.
-        """
+        """Whether it is in the way: the start is not behind it, and start or end is in front of it, within its ends."""
         if self.surface.off_m(start_ned_m) < -BEHIND_M:
             return False
         return self.patch is None or any(self._faces(self.patch, place) for place in (start_ned_m, end_ned_m))
@@ -74,19 +72,16 @@ class SetpointError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What the envelope is measured from; local NED. No origin before arming.
-
-    `has_floor`: the fence's floor counts; without it the ground at the origin does, as while climbing from it.
-    `last_ned_m`, the place sent `since_last_s` ago, is None where the flight has turned to something else, as after
-    a hit: there alone may the setpoint jump. For `held_s` PX4 flies on with what nothing follows.
-    """
+    """What the envelope is measured from; local NED."""
 
     vehicle_ned_m: Vector3 | None
-    origin_ned_m: Vector3 | None
-    has_floor: bool
+    origin_ned_m: Vector3 | None  # None before arming
+    has_floor: bool  # the fence's; without it the ground at the origin counts, as while climbing from it
+    # The place that was sent before. None where the flight has turned to something else, as after a hit: there alone
+    # may the setpoint jump.
     last_ned_m: Vector3 | None = None
     since_last_s: float = 0.0
-    held_s: float = HELD_S + NOTICED_S
+    held_s: float = HELD_S + NOTICED_S  # for so long PX4 flies on with what nothing follows
     known: Sequence[KnownSurface] = ()
 
 

@@ -127,9 +127,7 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
 
 
 def note_height(flight: FlightContext) -> None:
-    """Note the height, whether the vehicle has left the ground, and whether it flies. A hit that pushes it down again
-    does not undo that.
-    """
+    """Note the height, whether it flies, and whether it has left the ground: a hit that pushes it down undoes none."""
     vehicle, origin = flight.vehicle, flight.origin_ned_m
     latest, heard_us, height_m = vehicle.history.latest, vehicle.last_position_us, None
     # A vehicle whose estimator fails sends no position, and other messages.

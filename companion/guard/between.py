@@ -72,9 +72,7 @@ class Between:
 
     def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
-        if name not in self._clients:
-            self._clients[name] = _Client(Decoder({}, _is_whole))
-        client = self._clients[name]
+        client = self._clients.setdefault(name, _Client(Decoder({}, _is_whole)))
         if not self.has_room(name):
             if not client.is_flood_told:
                 client.is_flood_told = True

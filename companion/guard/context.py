@@ -10,17 +10,14 @@ from companion.messages import Asked, Sticks
 
 @dataclass(slots=True)
 class GuardContext(FlightContext):
-    """Changed by the guard's parts within a step.
-
-    `keeps_others_out`: no setpoint but the guard's reaches the vehicle while it holds; so it is where all that is sent
-    passes through the guard. `is_to_hold`: the vehicle is given back to AUTO.LOITER whatever is configured.
-    """
+    """Changed by the guard's parts within a step."""
 
     config: GuardConfig = field(kw_only=True)
+    # No setpoint but the guard's reaches the vehicle while it holds; so it is where all that is sent passes the guard.
     keeps_others_out: bool = field(kw_only=True)
     after_recovery: Transition = field(default=Transition(Trigger.SETTLED))
     previous_mode: int | None = None
-    is_to_hold: bool = False
+    is_to_hold: bool = False  # is given back to hold whatever is configured
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
     was_met: bool = False  # since the guard began, and found fit to be guarded
     has_stood: bool = False  # on the ground, or disarmed, since the guard began

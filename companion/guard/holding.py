@@ -89,9 +89,7 @@ class GiveBack(GiveAway[GuardContext]):
         self._is_doubted = self.wish == previous  # whether it would hit again
 
     def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
-        """Whether a program's next setpoints are waited for, or a pilot's sticks to be released. Any other mode that
-        would hit again is given up.
-        """
+        """Whether other setpoints, or sticks, are waited for. Any other mode that would hit again is given up."""
         reason = leads_into(guard, self.wish) if self._is_doubted else None
         if reason is None:
             self._is_doubted = False

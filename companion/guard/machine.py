@@ -201,11 +201,7 @@ class GuardCore(Core[GuardContext]):
         requested = guard.command_client.requested_mode
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
-        holder = taken_by(guard, requested)
-        if holder is None:
-            return None
-        who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot or a program"
-        return f"{who} took over in {guard.vehicle.mode_name}"
+        return taken_by(guard, requested, "the pilot or a program")
 
     def _link_restored(self, now_us: int) -> Transition | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""

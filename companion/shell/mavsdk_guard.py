@@ -12,8 +12,8 @@ from itertools import product
 from typing import Any, Self
 
 from companion.companion import StepResult
-from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
+from companion.guard.guard import AttachedGuard
 from companion.guard.states import State
 from companion.mavlink.moves import REQUESTS, SETPOINTS
 from companion.mavlink.named import packet_from

@@ -15,9 +15,8 @@ from bench.fly.commanded import MANUAL_POSITION, OFFBOARD, REPEATED_EVERY_S, Com
 from bench.fly.packets import GROUND_STATION, decoded
 from bench.fly.virtual_time import EPOCH_US
 from companion.companion import StepResult
-from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
-from companion.guard.guard import Guard
+from companion.guard.guard import AttachedGuard, Guard
 from companion.guard.states import State
 from companion.mavlink.named import named, packet_from
 from companion.report import Event

@@ -55,11 +55,10 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transitio
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion", is_left=True)
-    holder = taken_by(flight, flight.command_client.requested_mode)
-    if holder is None or (state is State.LANDING and _may_be_down(flight, now_us)):
+    taken = taken_by(flight, flight.command_client.requested_mode, "the pilot")
+    if taken is None or (state is State.LANDING and _may_be_down(flight, now_us)):
         return None
-    who = "a failsafe of the vehicle" if holder == "failsafe" else "the pilot"
-    return Transition(Trigger.CONTROL_LOST, f"{who} took over in {vehicle.mode_name}; setpoints stopped", is_left=True)
+    return Transition(Trigger.CONTROL_LOST, f"{taken}; setpoints stopped", is_left=True)
 
 
 def _may_be_down(flight: FlightContext, now_us: int) -> bool:
@@ -158,7 +157,7 @@ def who_decided(flight: FlightContext, requested_mode: int | None) -> Literal["f
 RETURNS_US = 400_000
 
 
-def taken_by(flight: FlightContext, requested_mode: int | None) -> Literal["failsafe", "pilot"] | None:
+def taken_by(flight: FlightContext, requested_mode: int | None, others: str) -> str | None:
     """Who has taken the vehicle (see `who_decided`): not a failsafe for want of setpoints that may end by itself.
 
     One that has landed the vehicle does not, or nearly: nobody expects it to take off.
@@ -175,7 +174,7 @@ def taken_by(flight: FlightContext, requested_mode: int | None) -> Literal["fail
             flight.foreign_mode_since_us = flight.trajectory_us
         if flight.trajectory_us - flight.foreign_mode_since_us < RETURNS_US:
             return None
-    return holder
+    return f"{'a failsafe of the vehicle' if holder == 'failsafe' else others} took over in {flight.vehicle.mode_name}"
 
 
 # As long as two modes take that are refused: a hand-over that does not end keeps nobody in OFFBOARD.

@@ -155,9 +155,7 @@ RESTS_WITHIN_US = 6_000_000
 
 
 def rests(flight: FlightContext, near: Lasting, goal_ned_m: Vector3) -> bool:
-    """Whether a vehicle stays at a place: one that turns round is slow for a moment, too. `near`: for how long it has
-    been there; call with each position.
-    """
+    """Whether it stays at a place, `near` it for long enough: one that turns round is slow for a moment, too."""
     config, latest = flight.mission.companion, flight.latest
     place = flight.reflex.place_ned_m(latest)
     off_m = max(math.dist(each, goal_ned_m) for each in (place, plus(place, BRAKES_S, latest.velocity_ned_m_s)))

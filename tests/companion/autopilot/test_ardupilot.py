@@ -18,9 +18,8 @@ from companion.autopilot.interface import Pilot
 from companion.autopilot.known import MODE_NAMES
 from companion.autopilot.setup import SerialLine, Verdict
 from companion.autopilot.setup import Setup as VehicleSetup
-from companion.guard.attached import AttachedGuard
 from companion.guard.config import GuardConfig
-from companion.guard.guard import Guard
+from companion.guard.guard import AttachedGuard, Guard
 from companion.link.vehicle import Identity, Vehicle
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder

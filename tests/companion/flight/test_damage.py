@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.flight.damage import note_motors
+from companion.flight.after_hit import note_motors
 from companion.flight.plan import mission_lines
 from companion.messages import ImuSample, LandedState, LocalPosition, MotorOutputs, Sample
 from companion.motion.config import GRAVITY_M_S2
