@@ -1,7 +1,6 @@
 """What the parts of a flight share: the mission, the vehicle's state, messages to send and events."""
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -284,7 +283,7 @@ class FlightContext:
 FlightT = TypeVar("FlightT", bound=FlightContext)
 
 
-class Handler(ABC, Generic[FlightT]):
+class Handler(Generic[FlightT]):
     """What is done in a state; one is made each time the state is entered."""
 
     finished = False  # nothing is left to send
@@ -297,9 +296,9 @@ class Handler(ABC, Generic[FlightT]):
         """The setpoint for now, which in most states does not move; None while none must be sent."""
         return self._target
 
-    @abstractmethod
     def step(self, flight: FlightT, inputs: Inputs, now_us: int) -> Transition | None:
         """Do what is due; a transition when the state is over."""
+        return None
 
 
 def as_text(vector: Vector3) -> str:

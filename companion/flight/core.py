@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Generic
 from companion.flight.after_hit import note_motors
 from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition
 from companion.flight.envelope import Surroundings, bounded
+from companion.flight.handlers.ending import Released
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.vehicle_update import note_height
@@ -54,6 +55,8 @@ class Core(ABC, Generic[FlightT]):
     """The trigger that gives the vehicle away."""
     giving_away: ClassVar[tuple[Enum, ...]]
     """States in which it is given away already."""
+    failed: ClassVar[Enum]
+    """The state after a fault in which even giving away fails."""
     state: Any
 
     def __init__(self, flight: FlightT) -> None:
@@ -190,9 +193,11 @@ class Core(ABC, Generic[FlightT]):
     def _enter(self, previous: Any, transition: Transition, now_us: int) -> Handler[Any]:
         """What is done in the present state, which was entered by that transition."""
 
-    @abstractmethod
     def _release(self, text: str) -> None:
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
+        flight, self.handler = self.flight, Released(self.flight, self.now_us)
+        if self.state not in self.giving_away or flight.outcome is None:
+            self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
     def _take(self, transition: Transition | None, now_us: int) -> bool:
         """Whether it moves on. A trigger counts by its name: a guard takes a flight's, too."""

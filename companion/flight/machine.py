@@ -44,6 +44,7 @@ class FlightCore(Core[FlightContext]):
     handlers = HANDLERS
     stopping = Trigger.INTERRUPTED
     giving_away = FINAL_STATES
+    failed = State.ABORTED
     state: State = State.CONNECT
     _away_us: int | None = None  # since when the vehicle has not followed, as far as that is dealt with
 
@@ -94,11 +95,6 @@ class FlightCore(Core[FlightContext]):
         # A hit may be taken back until its recovery is over.
         if flight.expectations and self.state is not State.RECOVERING:
             expectations.review(flight, now_us)
-
-    def _release(self, text: str) -> None:
-        self.handler = Released(self.flight, self.now_us)
-        if self.state not in FINAL_STATES or self.flight.outcome is None:
-            self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
     def _enter(self, previous: State, transition: Transition, now_us: int) -> Handler[Any]:
         flight = self.flight

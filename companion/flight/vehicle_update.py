@@ -65,7 +65,11 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, now_us)
     if vehicle.conflicts > conflicts:
-        _report_conflict(flight, now_us)
+        last_us, flight.conflict_us = flight.conflict_us, now_us
+        # Once a run of contradictions.
+        if last_us is None or now_us - last_us >= LASTING_US:
+            text = "conflicting mode reports: one was not confirmed"
+            flight.report(now_us, "implausible", text, conflicts=vehicle.conflicts)
     if vehicle.mode is not None and (mode is None or vehicle.mode.custom_mode != mode.custom_mode):
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
@@ -116,14 +120,6 @@ def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, no
         flight.report(now_us, "unattended", text, loss_s=told.value)
     if all(name in parameters for name in autopilot.attitude_parameters):
         flight.reflex.loss_s = round(autopilot.attitude_held_s(parameters), 3)  # single precision on the wire
-
-
-def _report_conflict(flight: FlightContext, now_us: int) -> None:
-    """Reported once a run of contradictions."""
-    last_us, flight.conflict_us = flight.conflict_us, now_us
-    if last_us is None or now_us - last_us >= LASTING_US:
-        count = flight.vehicle.conflicts
-        flight.report(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
 def note_height(flight: FlightContext) -> None:

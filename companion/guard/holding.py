@@ -143,11 +143,6 @@ class StandDown(Handler[GuardContext]):
             self._target = guard.target.at_rest()
             guard.ask_for_mode(guard.vehicle.autopilot.sticks)
 
-    @property
-    def hands_over(self) -> bool:
-        """Whether the pilot does not have the vehicle yet."""
-        return self._target is not None
-
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._target is not None:
             outcome = guard.command_outcome(inputs, not guard.vehicle.flies_setpoints, now_us)

@@ -58,6 +58,7 @@ class GuardCore(Core[GuardContext]):
     handlers = HANDLERS
     stopping = Trigger.STOPPED
     giving_away = (State.GIVING_BACK,)
+    failed = State.ENDED
     state: State = State.CONNECTING
     is_enabled = False  # asked for, and not yet taken up
     _judged: Asked | None = None  # the program's setpoint that was last looked at
@@ -67,7 +68,8 @@ class GuardCore(Core[GuardContext]):
 
     @property
     def holds(self) -> bool:
-        return self.state in HOLDING or (isinstance(self.handler, StandDown) and self.handler.hands_over)
+        hands_over = self.state is State.STOOD_DOWN and self.handler.target(self.flight, self.now_us) is not None
+        return self.state in HOLDING or hands_over
 
     @property
     def _is_active(self) -> bool:
@@ -99,8 +101,9 @@ class GuardCore(Core[GuardContext]):
     def begins_in_flight(self) -> bool:
         """Whether a guard in between has met no vehicle before, and this one may fly by a program's setpoints."""
         guard, handler = self.flight, self.handler
-        is_first = isinstance(handler, GuardConnect) and not (guard.was_met or handler.is_unfit)
-        return is_first and bool(guard.config.between) and not guard.has_stood
+        is_unfit = guard.vehicle.identity is not None and isinstance(handler, GuardConnect) and handler.is_told
+        begins = self.state is State.CONNECTING and not (guard.was_met or is_unfit)
+        return begins and bool(guard.config.between) and not guard.has_stood
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
         if self.flight.keeps_others_out:
@@ -143,9 +146,6 @@ class GuardCore(Core[GuardContext]):
         self._take_all(self._led_back() or self.handler.step(guard, inputs, now_us), now_us)
         self._await_choice(held, now_us)
 
-    def _release(self, text: str) -> None:
-        self.state, self.handler, self.flight.reason = State.ENDED, Released(self.flight, self.now_us), text
-
     def _is_beside_program(self) -> bool:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
         guard, is_watching = self.flight, self.state is State.WATCHING
@@ -186,7 +186,10 @@ class GuardCore(Core[GuardContext]):
         if (stopped := inputs.stop_reason or guard.fault) and Trigger.STOPPED in TABLE[self.state]:
             return Transition(Trigger.STOPPED, stopped)
         if self.state not in HOLDING:
-            return self._link_restored(now_us)
+            # What was restarted stands, or is being met; what flies has not forgotten what it was asked for.
+            may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
+            is_back = may_be_restarted and guard.was_silent and not guard.is_silent(now_us)
+            return Transition(Trigger.STREAMS_GONE, LINK_RESTORED) if is_back else None
         silent = silent_position(guard)
         return None if silent is None else Transition(Trigger.POSITION_SILENT, silent)
 
@@ -202,14 +205,6 @@ class GuardCore(Core[GuardContext]):
         if isinstance(self.handler, GiveBack):
             requested = self.handler.wish
         return taken_by(guard, requested, "the pilot or a program")
-
-    def _link_restored(self, now_us: int) -> Transition | None:
-        """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
-        guard = self.flight
-        may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
-        if not may_be_restarted or guard.is_silent(now_us) or not guard.was_silent:
-            return None
-        return Transition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
     def _enter(self, previous: State, transition: Transition, now_us: int) -> Handler[Any]:
         guard, trigger = self.flight, Trigger[transition.trigger.name]

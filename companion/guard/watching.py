@@ -102,11 +102,6 @@ class GuardConnect(Meet[GuardContext]):
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
     """
 
-    @property
-    def is_unfit(self) -> bool:
-        """Whether there is a vehicle, and it cannot be guarded by now."""
-        return self._requests is not None and self._is_told
-
     def _commands(self, guard: GuardContext) -> list[VehicleCommand]:
         echoes = set_message_interval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ))
         sticks = set_message_interval(guard.vehicle.autopilot.sticks_message, round(1e6 / STICKS_HZ))

@@ -56,7 +56,7 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
     core, ardupilot = GuardCore(GuardConfig(between=("udpin://:14540",))), Heartbeat(1, 1, 2, 3, False, 5, 3)
     for now_us, heard in ((SECOND, [ardupilot]), (3 * SECOND, []), (3 * SECOND + 1, [ardupilot])):
         core.advance(heard, now_us)
-    assert core.reflex.monitor.estimator.hides_clipping and not core.flight.was_met and not core.handler.is_unfit
+    assert core.reflex.monitor.estimator.hides_clipping and not core.flight.was_met and not core.handler.is_told
     core.state, core.flight.is_wreck, core.flight.fault = State.CRASHED, True, "of the guard's"
     core.advance((), 4 * SECOND)
     assert core.state is State.STANDING_BY and not core.flight.is_wreck

@@ -1,6 +1,6 @@
 """States connect and ready: who is there, are its streams fast enough, does the person agree."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from itertools import chain
 
@@ -11,7 +11,7 @@ from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, VehicleCommand, request_message, set_message_interval
 
 
-class Meet(Handler[FlightT]):
+class Meet(Handler[FlightT], ABC):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard.
 
     Of a vehicle that has restarted nothing that was measured before is valid.
@@ -24,7 +24,7 @@ class Meet(Handler[FlightT]):
         self._requests: Iterator[VehicleCommand] | None = None
         self._asked: float | None = None  # the last message
         self._measuring_since_us: int | None = None
-        self._is_told = False  # what is waited for
+        self.is_told = False  # what is waited for
 
     @abstractmethod
     def _judge(self, flight: FlightT, now_us: int) -> Transition | None:
@@ -39,16 +39,16 @@ class Meet(Handler[FlightT]):
         identity, companion = flight.vehicle.identity, flight.mission.companion
         if identity is None:
             wait_s = companion.link.heartbeat_wait_s
-            if self._is_told or now_us - self._started_us < wait_s * 1e6:
+            if self.is_told or now_us - self._started_us < wait_s * 1e6:
                 return None
             text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
             if not companion.link.wait:
                 return Transition(Trigger.REFUSED, f"{text}; is the address right?")
-            self._is_told = True
+            self.is_told = True
             flight.report(now_us, "link", f"{text}: waiting for it")
             return None
         if self._requests is None:
-            self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
+            self._requests, flight.was_silent, self.is_told = iter(self._commands(flight)), False, False
             self._started_us = now_us
             name = identity.autopilot.name
             article = "an" if name[0] in "AEIOU" else "a"
@@ -83,8 +83,8 @@ class Meet(Handler[FlightT]):
 
     def _ask_again(self, flight: FlightT, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""
-        if not self._is_told:
-            self._is_told = True
+        if not self.is_told:
+            self.is_told = True
             flight.report(now_us, "link", text)
         self._requests, self._measuring_since_us = iter(self._commands(flight)), None
 

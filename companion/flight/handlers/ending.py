@@ -186,9 +186,6 @@ class Released(Handler[FlightContext]):
 
     finished = True
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> None:
-        return None
-
 
 class GiveAway(Handler[FlightT]):
     """Ask for a mode straight after a report of the present one; setpoints go on until it is seen.
