@@ -93,14 +93,15 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
         flight.motors = MotorWatch(len(flight.collisions))
         return
     rotors = 0 if vehicle.identity is None else ROTORS.get(vehicle.identity.vehicle_type, 0)
-    if not rotors:
+    asked = [sample.outputs[:rotors] for sample in samples if isinstance(sample, MotorOutputs)]
+    if not rotors or not asked:
         return
     hits = len(flight.hits)
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
     was_hit = hits > 0 if flies and (hits == 0 or _is_free(flight)) else None
-    for sample in samples:
-        if isinstance(sample, MotorOutputs) and len(sample.outputs) >= rotors:
-            damage = flight.motors.take(sample.outputs[:rotors], was_hit, now_us)
+    for outputs in asked:
+        if len(outputs) == rotors:
+            damage = flight.motors.take(outputs, was_hit, now_us)
             if damage is not None:
                 data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
                 wanted = flight.mission.on_damage

@@ -14,15 +14,7 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, ModeReport, Vehicle
 from companion.memory.surroundings import ObstacleMap
-from companion.messages import (
-    AttitudeSetpoint,
-    CommandAck,
-    LocalPosition,
-    Outgoing,
-    PositionSetpoint,
-    Sticks,
-    Vector3,
-)
+from companion.messages import AttitudeSetpoint, CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
@@ -84,8 +76,7 @@ class Inputs(NamedTuple):
     impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
-    sticks: Sequence[Sticks] = ()  # this and the next are a guard's
-    is_enabled: bool = False  # by a person, after it stood down
+    is_enabled: bool = False  # a guard that stood down, by a person
 
 
 @dataclass(slots=True)

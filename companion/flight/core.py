@@ -20,15 +20,7 @@ from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.vehicle_update import note_height
 from companion.link.commands import CommandClient
-from companion.messages import (
-    CommandAck,
-    LocalPosition,
-    MotorOutputs,
-    OnboardHeartbeat,
-    Outgoing,
-    PositionSetpoint,
-    Sample,
-)
+from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, PositionSetpoint, Sample
 from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import AWAY_M_S2, HELD_S, LEAD_S, NOTICED_S
@@ -149,8 +141,7 @@ class Core(ABC, Generic[FlightT]):
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
-            if not flight.vehicle.armed or MotorOutputs in map(type, samples):
-                note_motors(flight, samples, now_us)
+            note_motors(flight, samples, now_us)
         except Exception as error:
             self._fail(error, now_us)
         return self.handler is not before

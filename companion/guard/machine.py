@@ -122,10 +122,10 @@ class GuardCore(Core[GuardContext]):
         if guard.vehicle.armed is False and self.resets.has_shifted:
             # It may restart, and count its resets from zero.
             self.resets = Resets()
-        inputs = inputs._replace(sticks=sticks, is_enabled=self.is_enabled)
+        inputs = inputs._replace(is_enabled=self.is_enabled)
         guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.holds
-        self._take(self._from_outside(inputs, now_us), now_us)
+        self._take(self._from_outside(inputs, sticks, now_us), now_us)
         if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and goes_down(guard, now_us)
             self._take(crashed(guard, meant, now_us), now_us)
@@ -171,14 +171,14 @@ class GuardCore(Core[GuardContext]):
         guard.is_to_hold, guard.target = False, None
         guard.yaw_rad = guard.vehicle.heading_rad
 
-    def _from_outside(self, inputs: Inputs, now_us: int) -> Transition | None:
+    def _from_outside(self, inputs: Inputs, sticks: Sequence[Sticks], now_us: int) -> Transition | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         guard = self.flight
         guard.was_silent |= guard.is_silent(now_us)
         if guard.vehicle.armed is False and Trigger.DISARMED in TABLE[self.state]:
             return Transition(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
-            lost = self._taken_by_another(inputs) or silent_link(guard, now_us)
+            lost = self._taken_by_another(sticks) or silent_link(guard, now_us)
             if lost is not None:
                 return Transition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
@@ -193,10 +193,10 @@ class GuardCore(Core[GuardContext]):
         silent = silent_position(guard)
         return None if silent is None else Transition(Trigger.POSITION_SILENT, silent)
 
-    def _taken_by_another(self, inputs: Inputs) -> str | None:
+    def _taken_by_another(self, sticks: Sequence[Sticks]) -> str | None:
         guard = self.flight
         override, offboard = guard.vehicle.autopilot.stick_override, guard.vehicle.autopilot.setpoints
-        if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in inputs.sticks):
+        if guard.sticks is not None and any(has_moved(guard.sticks, now, override) for now in sticks):
             return STICKS
         if self.state is State.GIVING_BACK and guard.vehicle.flies_setpoints:
             # Late: it was asked for, and given up.
