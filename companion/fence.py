@@ -11,8 +11,6 @@ from shapely.ops import nearest_points
 
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
-NorthEast = tuple[Number, Number]
-
 # A fence for someone who gives none: a large room, and well inside the range of sight.
 DEFAULT_RADIUS_M = 15.0
 # A corner nearer to another than this is the same corner typed twice.
@@ -31,7 +29,7 @@ class Fence(StrictModel):
 
     radius_m: Positive | None = None
     """Of a circle round the arming position; 15 where there is no polygon either."""
-    polygon_ne_m: Annotated[tuple[NorthEast, ...], Field(min_length=3)] | None = None
+    polygon_ne_m: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=3)] | None = None
     """Corners [north, east] round an area with the arming position in it."""
     max_height_m: Positive = 6.0
     """Above the arming position."""

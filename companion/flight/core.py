@@ -18,7 +18,7 @@ from companion.flight.envelope import Surroundings, bounded
 from companion.flight.handlers.ending import Released
 from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.vehicle_update import note_height
+from companion.flight.vehicle_update import note_height, update_vehicle
 from companion.link.commands import CommandClient
 from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, PositionSetpoint, Sample
 from companion.motion.resets import PLACES, Resets
@@ -162,9 +162,9 @@ class Core(ABC, Generic[FlightT]):
             self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
         return samples
 
-    @abstractmethod
     def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
         """Update what is known of the vehicle; why it is refused, or None."""
+        return update_vehicle(self.flight, samples, now_us)
 
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""

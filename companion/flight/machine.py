@@ -16,7 +16,7 @@ from companion.flight.handlers.recovering import record_collision
 from companion.flight.handlers.takeoff_and_landing import Land, RecoverInOffboard, TakeOff
 from companion.flight.obstacle_map import remember
 from companion.flight.states import FINAL_STATES, IN_THE_AIR, ON_THE_WAY, TABLE, State, Trigger
-from companion.flight.vehicle_update import situation_of, update_vehicle
+from companion.flight.vehicle_update import situation_of
 from companion.messages import Sample
 from companion.mission.model import Mission
 from companion.reflex.detection.detector import Situation
@@ -65,9 +65,6 @@ class FlightCore(Core[FlightContext]):
 
     def next_deadline_us(self) -> int:
         return super().next_deadline_us() if self.stop_reason is None else self.now_us
-
-    def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:
-        return update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
         flight, self.stop_reason = self.flight, None

@@ -17,10 +17,6 @@ from companion.reflex.detection.monitor import CollisionMonitor
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.report import Event
 
-# Numbers for plots.
-_PHASE_NUMBER = {Phase.OFF: 0.0, Phase.QUIET: 1.0, Phase.ARMED: 2.0, Phase.CONTACT: 3.0}
-_NO_DATA = -1.0
-
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 # A ground station shows a text for some seconds and keeps a list: more of one subject pushes all others out of sight.
 # Once a second, as a HEARTBEAT.
@@ -93,8 +89,8 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
 def values(
     state: Enum, monitor: CollisionMonitor, latest: CollisionRecord | None, hits: int, time_us: int
 ) -> list[NamedValue | DebugVector]:
-    """The detector's numbers: phase, threshold and the latest hit's; and the state's, its place among all states."""
-    phase = _PHASE_NUMBER[monitor.state.phase] if monitor.no_data_reason is None else _NO_DATA
+    """The state's and the detector's numbers: of a state and a phase its place among all, of one without data -1."""
+    phase = float(list(Phase).index(monitor.state.phase)) if monitor.no_data_reason is None else -1.0
     sent: list[NamedValue | DebugVector] = [
         NamedValue(time_us, "rb_state", float(list(type(state)).index(state))),
         NamedValue(time_us, "rb_phase", phase),

@@ -116,8 +116,7 @@ def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, no
     autopilot, parameters = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
     parameters[told.name] = told.value
     if told.name == autopilot.loss_parameter and flight.reflex.loss_s is None and told.value > HELD_S:
-        text = longer_loss_text(autopilot, told.value)
-        flight.report(now_us, "unattended", text, loss_s=told.value)
+        flight.report(now_us, "unattended", longer_loss_text(autopilot, told.value), loss_s=told.value)
     if all(name in parameters for name in autopilot.attitude_parameters):
         flight.reflex.loss_s = round(autopilot.attitude_held_s(parameters), 3)  # single precision on the wire
 

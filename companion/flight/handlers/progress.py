@@ -5,31 +5,19 @@ from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Handler, Inputs, StepTally, Target, Transition
-from companion.flight.handlers.takeoff_and_landing import rests
+from companion.flight.handlers.takeoff_and_landing import climb_to, rests
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
 from companion.messages import Vector3
 from companion.mission import items
-from companion.mission.item_trajectory import (
-    LEAST_TRY_M_S,
-    climb,
-    first_leg,
-    home_around,
-    left_of,
-    stay,
-    trajectory_around,
-)
+from companion.mission.item_trajectory import LEAST_TRY_M_S, first_leg, home_around, left_of, stay, trajectory_around
 from companion.mission.trajectory import LineProfile, Motion, Trajectory
 from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus
 
 # Of a time-out, a goal out of reach, damage, and of the last item; "continue" is no move.
-_TRIGGERS = {
-    "abort": Trigger.INTERRUPTED,
-    "return": Trigger.RETURN_DUE,
-    "land": Trigger.LAND_DUE,
-}
+_TRIGGERS = {"abort": Trigger.INTERRUPTED, "return": Trigger.RETURN_DUE, "land": Trigger.LAND_DUE}
 
 
 class _OnTrajectory(Handler[FlightContext]):
@@ -84,8 +72,7 @@ class FlyItems(_OnTrajectory):
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
-                config, most_m_s = flight.mission.companion.flight, flight.mission.limits.max_speed_m_s
-                self._trajectory = climb(start, self._action.height_m, config, most_m_s)
+                self._trajectory = climb_to(flight, self._action.height_m, start)
             case items.WaitForItem(file=file):
                 flight.file_awaited = file
             case items.SetSpeedItem():

@@ -14,9 +14,8 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         flight.report(now_us, "by_position", f"recovery by position, as law paper has it: {reason}", reason=reason)
     hit = record.report()
     force_m_s2, v_c, speed_m_s = hit.peak_specific_force_m_s2, hit.impact_velocity_ned_m_s, hit.impact_speed_m_s
-    place, setpoint = (
-        as_text(flight.mission_ned_m(each)) for each in (hit.position_ned_m, hit.recovery_setpoint_ned_m)
-    )
+    place = as_text(flight.mission_ned_m(hit.position_ned_m))
+    setpoint = as_text(flight.mission_ned_m(hit.recovery_setpoint_ned_m))
     flight.report(
         hit.detected_at_us,
         "detection",
