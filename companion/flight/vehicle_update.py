@@ -99,11 +99,9 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
-    """On the ground a long round trip is a reason not to begin; in the air it is reported. For how long the
-    last setpoint is flown on is asked with it until it is answered.
-    """
+    """A long one is a reason not to begin on the ground; in the air it is reported."""
     flight.outbox.append(flight.round_trip.ask(now_us))
-    if flight.reflex.loss_s is None:
+    if flight.reflex.loss_s is None:  # for how long the last setpoint is flown on
         autopilot, told = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
         flight.outbox += [messages.ReadParameter(name) for name in autopilot.attitude_parameters if name not in told]
     text = flight.round_trip.alarm() if flight.vehicle.armed else None

@@ -73,14 +73,11 @@ class Between:
     def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
         client = self._clients.setdefault(name, _Client(Decoder({}, _is_whole)))
-        if not self.has_room(name):
-            if not client.is_flood_told:
-                client.is_flood_told = True
-                self.news.append(f"{name} sends more than the link to the vehicle carries: the rest of it is lost")
-            return
-        for packet, _ in client.framer.feed(received):
-            if not isinstance(packet, Stray):
-                client.waiting.append(packet)
+        if self.has_room(name):
+            client.waiting += [packet for packet, _ in client.framer.feed(received) if not isinstance(packet, Stray)]
+        elif not client.is_flood_told:
+            client.is_flood_told = True
+            self.news.append(f"{name} sends more than the link to the vehicle carries: the rest of it is lost")
 
     def forget(self, name: str) -> None:
         """A client has gone; what it has said still goes."""
