@@ -212,10 +212,7 @@ class Core(ABC, Generic[FlightT]):
         """The detector's situation."""
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
-        """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one.
-
-        An attitude is sent for each IMU sample.
-        """
+        """Send the setpoint: at its rate, as the state changes, an attitude for each IMU sample. No other does."""
         flight, limiter, target = self.flight, self.limiter, self.flight.target
         leans = target is not None and target.lean is not None
         is_at_once = moved or (leans and self.reflex.sample_boot_us != self._sample_boot_us)

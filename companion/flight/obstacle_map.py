@@ -56,10 +56,7 @@ class FlightRoom:
         ]
 
     def inside(self, contact_ned_m: Vector3, goal_ned_m: Vector3) -> Vector3:
-        """The goal inside the fence: where the line from the contact leaves it.
-
-        For a contact outside the fence it is the nearest position inside.
-        """
+        """The goal inside the fence: where the line from the contact leaves it; the nearest for a contact outside."""
         fence, origin = self._flight.mission.fence, self._flight.origin_ned_m
         assert origin is not None, "hits are detected only in flight"
         (start_n, start_e, _), (end_n, end_e, end_d) = (minus(place, origin) for place in (contact_ned_m, goal_ned_m))

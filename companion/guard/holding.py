@@ -1,7 +1,4 @@
-"""The guard's states with its own setpoints: take over, recover, give back, and stand down for a pilot.
-
-It does not give back to what would fly on into what was touched.
-"""
+"""The guard's states with its own setpoints: take over, recover, give back to what hits nothing again, stand down."""
 
 import math
 
@@ -68,10 +65,8 @@ class GiveBack(GiveAway[GuardContext]):
     """Ask for one mode after the other until one is seen.
 
     A person's own request that crosses the first on the link, within its delay of about 10 ms, cannot be seen by
-    anybody.
-
-    A program's own OFFBOARD needs no asking: its setpoints are let through again. When no mode is taken the setpoints
-    stop, and PX4's action for lost setpoints follows.
+    anybody. A program's own OFFBOARD needs no asking: its setpoints are let through again. When no mode is taken the
+    setpoints stop, and PX4's action for lost setpoints follows.
     """
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
