@@ -222,8 +222,7 @@ class HoldAfterRecovery(Handler[FlightContext]):
     """Stay at the recovery setpoint for the policy's time."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        own = flight.steps[flight.tally.index].item.on_collision
-        hold_s = (own or flight.mission.on_collision).hold_s
+        hold_s = (flight.steps[flight.tally.index].item.on_collision or flight.mission.on_collision).hold_s
         self._until_us = now_us + round(hold_s * 1e6)
         self._target = flight.target
         flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
