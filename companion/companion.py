@@ -13,7 +13,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
-from companion.messages import ComputerStatus
+from companion.messages import ComputerStatus, Sample
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport, Status
 
@@ -46,8 +46,12 @@ class Stepped(Generic[CoreT]):
         if not self._has_begun:
             self._has_begun = True
             core.begin(now_us)
-        heard = self._decoder.feed(received) if received else []
-        samples = [sample for _, sample in heard if sample is not None]
+        frames: list[bytes] = []
+        samples: list[Sample] = []
+        for frame, sample in self._decoder.feed(received) if received else ():
+            frames.append(frame)
+            if sample is not None:
+                samples.append(sample)
         # Most of what a vehicle sends is for others, and shows nothing.
         messages, events = core.advance(samples, now_us) if samples or core.is_due(now_us) else ([], [])
         identity = core.flight.vehicle.identity
@@ -63,7 +67,7 @@ class Stepped(Generic[CoreT]):
                 sent += self._encoder.packets(message)
             except Exception as error:
                 core.fault(error, now_us)
-        return StepResult(tuple(frame for frame, _ in heard), tuple(sent), tuple(events))
+        return StepResult(tuple(frames), tuple(sent), tuple(events))
 
     def last_words(self) -> list[tuple[float, bytes]]:
         """What the vehicle has to be told if this program dies now, each so many seconds later."""

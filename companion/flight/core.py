@@ -20,7 +20,15 @@ from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.vehicle_update import note_height, update_vehicle
 from companion.link.commands import CommandClient
-from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, PositionSetpoint, Sample
+from companion.messages import (
+    CommandAck,
+    LocalPosition,
+    MotorOutputs,
+    OnboardHeartbeat,
+    Outgoing,
+    PositionSetpoint,
+    Sample,
+)
 from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import AWAY_M_S2, HELD_S, LEAD_S, NOTICED_S
@@ -130,18 +138,20 @@ class Core(ABC, Generic[FlightT]):
 
         Heartbeats, setpoints and the log go on meanwhile. After a fault hits are not detected any more.
         """
-        flight, before = self.flight, self.handler
+        flight, before, kinds = self.flight, self.handler, set(map(type, samples))
         try:
-            samples = self._in_one_frame(samples, now_us)
+            if not PLACES.isdisjoint(kinds):
+                samples = self._in_one_frame(samples, now_us)
             refusal = self._hear(samples, now_us)
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
-            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
+            positions = [each for each in samples if isinstance(each, LocalPosition)] if LocalPosition in kinds else []
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
-            note_motors(flight, samples, now_us)
+            if not flight.vehicle.armed or MotorOutputs in kinds:
+                note_motors(flight, samples, now_us)
         except Exception as error:
             self._fail(error, now_us)
         return self.handler is not before
@@ -151,8 +161,6 @@ class Core(ABC, Generic[FlightT]):
 
         One that is still wrong from a hit only puts that right.
         """
-        if PLACES.isdisjoint(map(type, samples)):
-            return samples
         before, is_valid = self.resets.shift_ned_m, self.reflex.monitor.estimator.validity.is_valid
         most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
         samples = [self.resets.follow(sample, most_m) for sample in samples]
@@ -169,7 +177,9 @@ class Core(ABC, Generic[FlightT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
+        is_blind = self.reflex.monitor.no_data_reason is not None
+        if is_blind or flight.blind.since_us is not None:
+            flight.blind.update(is_blind, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:
@@ -190,10 +200,8 @@ class Core(ABC, Generic[FlightT]):
         if self.state not in self.giving_away or flight.outcome is None:
             self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
-    def _take(self, transition: Transition | None, now_us: int) -> bool:
+    def _take(self, transition: Transition, now_us: int) -> bool:
         """Whether it moves on. A trigger counts by its name: a guard takes a flight's, too."""
-        if transition is None:
-            return False
         ways = {trigger.name: state for trigger, state in self.table[self.state].items()}
         if transition.trigger.name not in ways:
             return False
@@ -203,7 +211,7 @@ class Core(ABC, Generic[FlightT]):
 
     def _take_all(self, transition: Transition | None, now_us: int) -> None:
         """That one and all that follow from it in this step."""
-        while self._take(transition, now_us):
+        while transition is not None and self._take(transition, now_us):
             # The answers and positions of this step belong to the state that asked for them.
             transition = self.handler.step(self.flight, Inputs(), now_us)
 

@@ -68,8 +68,8 @@ class FlightCore(Core[FlightContext]):
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
         flight, self.stop_reason = self.flight, None
-        if self.state not in FINAL_STATES:
-            self._take(early_end(flight, self.state, inputs, now_us), now_us)
+        if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
+            self._take(end, now_us)
         if flight.foreign_mode_since_us != self._away_us and flight.has_position and self.state in FOLLOWING:
             self._away_us = flight.foreign_mode_since_us
             if self._away_us is not None:
@@ -78,8 +78,8 @@ class FlightCore(Core[FlightContext]):
                     self.handler.interrupt(flight)
                 flight.target = Target(flight.latest.position_ned_m, flight.yaw_rad)
                 self.handler = self.handlers[self.state](flight, now_us)
-        if self.state in IN_THE_AIR:
-            self._take(crashed(flight, self.state is State.LANDING, now_us), now_us)
+        if self.state in IN_THE_AIR and (crash := crashed(flight, self.state is State.LANDING, now_us)) is not None:
+            self._take(crash, now_us)
         for estimate in inputs.impacts:
             if self.state in IN_THE_AIR and not lands_anyway(flight):
                 if isinstance(self.handler, FlyItems):
@@ -88,7 +88,8 @@ class FlightCore(Core[FlightContext]):
                 record_collision(flight, estimate, now_us)
                 decide(flight, self.state, now_us)
                 self._take(Transition(Trigger.COLLISION), now_us)
-        self._take_all(self.handler.step(flight, inputs, now_us), now_us)
+        if (transition := self.handler.step(flight, inputs, now_us)) is not None:
+            self._take_all(transition, now_us)
         # A hit may be taken back until its recovery is over.
         if flight.expectations and self.state is not State.RECOVERING:
             expectations.review(flight, now_us)

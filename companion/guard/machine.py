@@ -125,10 +125,12 @@ class GuardCore(Core[GuardContext]):
         inputs = inputs._replace(is_enabled=self.is_enabled)
         guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.holds
-        self._take(self._from_outside(inputs, sticks, now_us), now_us)
+        if (move := self._from_outside(inputs, sticks, now_us)) is not None:
+            self._take(move, now_us)
         if self.state in MAY_CRASH:
             meant = self.state not in HOLDING and goes_down(guard, now_us)
-            self._take(crashed(guard, meant, now_us), now_us)
+            if (crash := crashed(guard, meant, now_us)) is not None:
+                self._take(crash, now_us)
         for estimate in inputs.impacts:
             if estimate.impact.kind is ImpactKind.CRASH and self.state not in HOLDING:
                 continue  # a wreck is not taken over

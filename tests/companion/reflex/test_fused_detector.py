@@ -361,7 +361,7 @@ def test_what_shakes_along_its_thrust_may_shake_sideways_a_third_as_much_at_once
     def shakes(t):
         return (-1) ** (t // WINDOW_US)
 
-    calm = {"lift": lambda t: GRAVITY + 3.0 * shakes(t), "heard": (Attitude, AttitudeTarget)}
+    calm: dict[str, Any] = {"lift": lambda t: GRAVITY + 3.0 * shakes(t), "heard": (Attitude, AttitudeTarget)}
     assert Flight(lambda t: (4.5 * shakes(t) * (t > HIT_US), 0.0, 0.0), **calm).fly() == []
     assert len(Flight(pulse((0.0, 4.0, 0.0), HIT_US, 20_000), **calm).fly()) == 1
 
