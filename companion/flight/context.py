@@ -239,8 +239,7 @@ class FlightContext:
         if self.expected_mode is None or self.vehicle.is_mode_known:
             return True
         is_silent = now_us - self.vehicle.last_received_us >= OLD_NEWS_US
-        pending = self.command_client.pending
-        is_unsaid = pending is not None and pending.attempts == 0
+        is_unsaid = self.command_client.pending is not None and self.command_client.attempts == 0
         return is_silent and self.vehicle.unconfirmed_mode is None and is_unsaid
 
     def ask_for_mode(self, custom_mode: int) -> None:
