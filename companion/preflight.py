@@ -11,7 +11,7 @@ import numpy as np
 
 from companion import messages
 from companion.autopilot.known import NAMES
-from companion.autopilot.setup import BAD, DOUBTFUL, PreflightItem, SerialLine, Setup, judged
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup, judged
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -215,18 +215,18 @@ def _delivery(survey: Preflight) -> Iterator[PreflightItem]:
         lost, bad, sent = delivery.lost, delivery.unreadable_bytes, delivery.received + delivery.lost
         remedy = "a wire loses nothing: ground beside it, short, the same baud rate at both ends"
         found = f"{lost} of {sent} packets lost ({100.0 * lost / sent:.1f} %), {bad} unreadable bytes"
-        yield judged("packets", found, (lost > 0 or bad > 0, DOUBTFUL, remedy))
+        yield judged("packets", found, lost > 0 or bad > 0, remedy)
     if delivery.signed and not survey.parameters:
         # With a key, packets come here without their signatures.
         found = "the vehicle signs its packets and answers nothing that has no signature"
-        yield PreflightItem("signing", BAD, found, "--signing-key FILE, with the key that the vehicle has")
+        yield judged("signing", found, is_bad=True, remedy="--signing-key FILE, with the key that the vehicle has")
     jitter_us, timer_ms = delivery.jitter_us, None if line is None else line.latency_timer_ms
     if jitter_us is not None:
         held = "an FTDI converter's latency timer is " + ("16 ms by default" if timer_ms is None else f"{timer_ms} ms")
         remedy = f"{held}; 1 ms is best (`rebound service install` sets it); a busy computer does the same"
         is_held = timer_ms is not None and timer_ms > 1
         found = f"delays of samples differ by {jitter_us / 1e3:.1f} ms"
-        yield judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
+        yield judged("arrival", found, is_held or jitter_us > UNEVEN_US, remedy)
 
 
 def _streams(survey: Preflight) -> Iterator[PreflightItem]:
@@ -234,47 +234,39 @@ def _streams(survey: Preflight) -> Iterator[PreflightItem]:
     remedies = survey.vehicle.autopilot.remedies
     for stream in survey.streams.streams:
         if stream.min_hz:
-            rate_hz = rates.get(stream.message_id.name, 0.0)
-            yield judged(
-                stream.message_id.name,
-                f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for",
-                (rate_hz < stream.min_hz, BAD, f"at least {stream.min_hz:g} Hz are needed; {remedies.slow_streams}"),
-                (rate_hz < 0.4 * stream.asked_hz, DOUBTFUL, remedies.full_link),
-            )
+            name = stream.message_id.name
+            rate_hz = rates.get(name, 0.0)
+            is_bad, is_less = rate_hz < stream.min_hz, rate_hz < 0.4 * stream.asked_hz
+            needed = f"at least {stream.min_hz:g} Hz are needed; {remedies.slow_streams}"
+            found = f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for"
+            yield judged(name, found, is_less, needed if is_bad else remedies.full_link, is_bad)
 
 
 def _estimate(survey: Preflight) -> Iterator[PreflightItem]:
     if not survey.positions:
         remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
-        yield PreflightItem("position", BAD, "no LOCAL_POSITION_NED", remedy)
+        yield judged("position", "no LOCAL_POSITION_NED", is_bad=True, remedy=remedy)
         return
     if not survey.flies:
         wander_m = spread([sample.position_ned_m for sample in survey.positions])
         noise_m_s = spread([sample.velocity_ned_m_s for sample in survey.positions])
         seconds = LISTENING_US / 1e6
         remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
-        yield judged(
-            "position",
-            f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)",
-            (wander_m > MOST_WANDER_M, BAD, remedy),
-            (wander_m > DOUBTFUL_WANDER_M, DOUBTFUL, remedy),
-        )
+        found = f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)"
+        yield judged("position", found, wander_m > DOUBTFUL_WANDER_M, remedy, wander_m > MOST_WANDER_M)
     remedies = survey.vehicle.autopilot.remedies
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
         name = survey.vehicle.autopilot.estimator_message.name
-        yield PreflightItem("estimator", DOUBTFUL, f"no {name}", remedies.no_estimator)
+        yield judged("estimator", f"no {name}", True, remedies.no_estimator)
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
-        yield PreflightItem("estimator", BAD, "no horizontal velocity", remedy)
+        yield judged("estimator", "no horizontal velocity", is_bad=True, remedy=remedy)
     else:
         is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_faulty for status in survey.estimator)
-        yield judged(
-            "estimator",
-            f"largest innovation test ratio {worst:.2f}",
-            (is_bad, BAD, "the estimator turns its sensors down: calibrate, check mounts"),
-            (worst >= DOUBTFUL_RATIO, DOUBTFUL, "calibrate compass and accelerometer"),
-        )
+        worse = "the estimator turns its sensors down: calibrate, check mounts"
+        remedy = worse if is_bad else "calibrate compass and accelerometer"
+        yield judged("estimator", f"largest innovation test ratio {worst:.2f}", worst >= DOUBTFUL_RATIO, remedy, is_bad)
 
 
 def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
@@ -282,7 +274,7 @@ def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
     if survey.vibration:
         clipped = survey.vibration[-1].clipped - survey.vibration[0].clipped
         remedy = "fasten the flight controller; check the accelerometer"
-        yield judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
+        yield judged("clipping", f"{clipped} clipped samples while {doing}", is_bad=clipped != 0, remedy=remedy)
     forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]
     threshold_m_s2 = survey.config.fused.side_threshold_m_s2
     if forces and survey.flies:
@@ -291,29 +283,26 @@ def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
         found = (
             f"{spread(forces):.2f} m/s^2 (RMS) hovering; sideways {most_m_s2:.1f} of {threshold_m_s2:g} that tell a hit"
         )
-        yield judged("vibration", found, (most_m_s2 >= threshold_m_s2, DOUBTFUL, remedy))
+        yield judged("vibration", found, most_m_s2 >= threshold_m_s2, remedy)
     elif forces:
         shakes_m_s2 = spread(forces)
         remedy = "let the vehicle stand still, motors off, and ask again"
         found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
-        yield judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
+        yield judged("shaking", found, shakes_m_s2 > STANDS_M_S2, remedy)
 
 
 def _time(survey: Preflight) -> PreflightItem:
     median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
     if median_us is None or worst_us is None:
-        return PreflightItem("time", DOUBTFUL, "TIMESYNC is not answered", survey.vehicle.autopilot.remedies.no_time)
-    return judged(
-        "time",
-        f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst",
-        (median_us > MOST_TRIP_US, BAD, "a wire or a direct link instead of this one"),
-        (median_us > DOUBTFUL_TRIP_US, DOUBTFUL, "a wire instead of a radio; serial: baud rate 921600"),
-    )
+        return judged("time", "TIMESYNC is not answered", True, survey.vehicle.autopilot.remedies.no_time)
+    found = f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst"
+    is_bad, quick = median_us > MOST_TRIP_US, "a wire instead of a radio; serial: baud rate 921600"
+    remedy = "a wire or a direct link instead of this one" if is_bad else quick
+    return judged("time", found, median_us > DOUBTFUL_TRIP_US, remedy, is_bad)
 
 
 def _battery(survey: Preflight) -> PreflightItem:
     percent = survey.vehicle.battery_percent
     if percent is None:
-        return PreflightItem("battery", DOUBTFUL, "unknown", survey.vehicle.autopilot.remedies.no_battery)
-    cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
-    return judged("battery", f"{percent} %", *cases)
+        return judged("battery", "unknown", True, survey.vehicle.autopilot.remedies.no_battery)
+    return judged("battery", f"{percent} %", percent < DOUBTFUL_BATTERY, "charge it", percent < BAD_BATTERY)

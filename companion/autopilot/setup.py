@@ -36,9 +36,6 @@ class Verdict(Enum):
     BAD = "no"
 
 
-DOUBTFUL, BAD = Verdict.DOUBTFUL, Verdict.BAD
-
-
 @dataclass(frozen=True, slots=True)
 class PreflightItem:
     """`fix` is a parameter and the value that mends it; None where only a person can."""
@@ -51,16 +48,21 @@ class PreflightItem:
 
 
 def judged(
-    item: str, found: str, *cases: tuple[bool, Verdict, str], mended: float | None = None, beyond: str = ""
+    item: str,
+    found: str,
+    is_off: bool = False,
+    remedy: str = "",
+    is_bad: bool = False,
+    mended: float | None = None,
+    beyond: str = "",
 ) -> PreflightItem:
-    """The first case that holds, with its remedy; good where none does. `mended`: the parameter's value that mends it.
-
-    `beyond` is added to what was found where it is not good.
+    """Good, or with its remedy doubtful where `is_off`, bad where `is_bad`. `mended`: the parameter's value that mends
+    it. `beyond` is added to what was found where it is not good.
     """
-    for holds, verdict, remedy in cases:
-        if holds:
-            return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
-    return PreflightItem(item, Verdict.GOOD, found)
+    if not (is_off or is_bad):
+        return PreflightItem(item, Verdict.GOOD, found)
+    verdict = Verdict.BAD if is_bad else Verdict.DOUBTFUL
+    return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
 
 
 def judged_settings(
@@ -69,13 +71,12 @@ def judged_settings(
     """An item for each parameter, by its own judge; one that was not told is doubtful."""
     for name, judge in settings.items():
         value = setup.parameters.get(name)
-        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        unread = judged(name, "the vehicle did not tell it", True, "ask again over a better link")
         yield unread if value is None else judge(name, value, setup)
 
 
 def judged_loss(name: str, loss_s: float, found: str, cost: str = "") -> PreflightItem:
     """For how long the last attitude is flown on. `cost`: of less, for people."""
-    is_long = round(loss_s, 3) > MOST_HELD_S
     remedy = f"{name} = {MOST_HELD_S:g}, or recoveries are flown by position alone{cost}"
     beyond = f"; an attitude is safe to hold {MOST_HELD_S:g} s"
-    return judged(name, found, (is_long, DOUBTFUL, remedy), mended=MOST_HELD_S, beyond=beyond)
+    return judged(name, found, round(loss_s, 3) > MOST_HELD_S, remedy, mended=MOST_HELD_S, beyond=beyond)

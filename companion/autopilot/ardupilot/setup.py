@@ -3,16 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from companion.autopilot.setup import (
-    BAD,
-    DOUBTFUL,
-    PreflightItem,
-    SerialLine,
-    Setup,
-    judged,
-    judged_loss,
-    judged_settings,
-)
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup, judged, judged_loss, judged_settings
 
 # For so long Copter flies the last attitude or velocity on.
 LOSS = "GUID_TIMEOUT"
@@ -50,7 +41,7 @@ def frame(setup: Setup) -> Iterator[PreflightItem]:
         named, kind = CLASSES.get(int(number), "another frame"), setup.vehicle_type
         remedy = "FRAME_CLASS and FRAME_TYPE in Mission Planner: Setup, Frame Type; then reboot"
         found = f"{number:g} ({named}), MAV_TYPE says {kind}"
-        yield judged("FRAME_CLASS", found, (named != kind, DOUBTFUL, remedy))
+        yield judged("FRAME_CLASS", found, named != kind, remedy)
 
 
 def port(setup: Setup) -> Iterator[PreflightItem]:
@@ -63,14 +54,14 @@ def port(setup: Setup) -> Iterator[PreflightItem]:
     speaking = [n for n in fitting if told.get(f"SERIAL{n}_PROTOCOL") in (MAVLINK_1, MAVLINK_2)]
     if not speaking:
         remedy = f"SERIAL2_PROTOCOL = {MAVLINK_2}, SERIAL2_BAUD as in --connect (921 for {COMPANION_BAUD}); then reboot"
-        yield PreflightItem("port", DOUBTFUL, f"no port has MAVLink at {line.baud} baud", remedy)
+        yield judged("port", f"no port has MAVLink at {line.baud} baud", True, remedy)
         return
     name = f"SERIAL{speaking[0]}"
     remedy = f"{name}_BAUD = 921, reboot, {COMPANION_BAUD} in --connect"
-    yield judged("port", f"{name}, {line.baud} baud", (line.baud < COMPANION_BAUD, DOUBTFUL, remedy))
+    yield judged("port", f"{name}, {line.baud} baud", line.baud < COMPANION_BAUD, remedy)
     if told[f"{name}_PROTOCOL"] == MAVLINK_1:
-        fix = (f"{name}_PROTOCOL", MAVLINK_2)
-        yield PreflightItem(fix[0], BAD, "MAVLink 1: no stream comes at its rate", f"{fix[0]} = 2, then reboot", fix)
+        protocol, found = f"{name}_PROTOCOL", "MAVLink 1: no stream comes at its rate"
+        yield judged(protocol, found, is_bad=True, remedy=f"{protocol} = 2, then reboot", mended=MAVLINK_2)
 
 
 def _timeout(name: str, timeout_s: float, setup: Setup) -> PreflightItem:
@@ -82,54 +73,53 @@ def _options(name: str, bits: float, setup: Setup) -> PreflightItem:
     value = int(bits) | THRUST_IS_THRUST
     found = f"{int(bits)}: an attitude's thrust is " + ("thrust" if int(bits) == value else "a climb rate")
     remedy = f"{name} = {value}, or recoveries are flown by position alone"
-    return judged(name, found, (int(bits) != value, DOUBTFUL, remedy), mended=value)
+    return judged(name, found, int(bits) != value, remedy, mended=value)
 
 
 def _filter(name: str, edge_hz: float, setup: Setup) -> PreflightItem:
     delay_ms = 1e3 / (math.sqrt(2.0) * math.pi * edge_hz) if edge_hz > 0.0 else 0.0
     found = f"{edge_hz:g} Hz: a hit shows about {delay_ms:.0f} ms late" if edge_hz > 0.0 else "off: hits are missed"
-    remedy = f"{name} = {LEAST_FILTER_HZ:g}"
-    return judged(name, found, (edge_hz < LEAST_FILTER_HZ, DOUBTFUL, remedy), mended=LEAST_FILTER_HZ)
+    return judged(name, found, edge_hz < LEAST_FILTER_HZ, f"{name} = {LEAST_FILTER_HZ:g}", mended=LEAST_FILTER_HZ)
 
 
 def _shaping(name: str, enabled: float, setup: Setup) -> PreflightItem:
     """Shaped, no asked turn is flown: Copter brakes the one that a hit has left, with half of what lifts."""
     found = "an attitude is " + ("shaped: its turn is braked, and height lost" if enabled else "flown as asked")
-    return judged(name, found, (enabled != 0.0, DOUBTFUL, f"{name} = 0"), mended=0)
+    return judged(name, found, enabled != 0.0, f"{name} = 0", mended=0)
 
 
 def _yaw(name: str, most: float, setup: Setup) -> PreflightItem:
     found = f"{most:g}: most of what brakes a turn" if most > 0.0 else "off: to brake a turn takes half of the lift"
-    return judged(name, found, (not 0.0 < most <= MOST_YAW, DOUBTFUL, f"{name} = {MOST_YAW:g}"), mended=MOST_YAW)
+    return judged(name, found, not 0.0 < most <= MOST_YAW, f"{name} = {MOST_YAW:g}", mended=MOST_YAW)
 
 
 def _fence(name: str, enabled: float, setup: Setup) -> PreflightItem:
     found = "its own fence is " + ("on" if enabled else "off")
     remedy = f"{name} = 0, or a fence that holds all of the mission's and its margin"
     beyond = ": a setpoint outside of it is dropped without a word"
-    return judged(name, found, (enabled != 0.0, DOUBTFUL, remedy), beyond=beyond)
+    return judged(name, found, enabled != 0.0, remedy, beyond=beyond)
 
 
 def _crash_check(name: str, enabled: float, setup: Setup) -> PreflightItem:
     found = "a vehicle that lies on its side " + ("stops its motors" if enabled else "keeps its motors running")
-    return judged(name, found, (enabled == 0.0, DOUBTFUL, f"{name} = 1; a recovery holds it off"), mended=1)
+    return judged(name, found, enabled == 0.0, f"{name} = 1; a recovery holds it off", mended=1)
 
 
 def _jerk(name: str, jerk_m_s3: float, setup: Setup) -> PreflightItem:
-    late = (jerk_m_s3 < LEAST_JERK_M_S3, DOUBTFUL, f"{name} = {LEAST_JERK_M_S3:g} or more")
-    return judged(name, f"{jerk_m_s3:g} m/s^3: how soon a recovery by position leans", late)
+    found = f"{jerk_m_s3:g} m/s^3: how soon a recovery by position leans"
+    return judged(name, found, jerk_m_s3 < LEAST_JERK_M_S3, f"{name} = {LEAST_JERK_M_S3:g} or more")
 
 
 def _lean(name: str, lean: float, setup: Setup) -> PreflightItem:
     per_degree = 1.0 if name == LEANS[0] else 100.0
-    flat = (lean < LEAST_LEAN_DEG * per_degree, DOUBTFUL, f"{name} = {LEAN_DEG * per_degree:g}")
-    return judged(name, f"Copter leans by {lean / per_degree:g} degrees at most", flat)
+    found = f"Copter leans by {lean / per_degree:g} degrees at most"
+    return judged(name, found, lean < LEAST_LEAN_DEG * per_degree, f"{name} = {LEAN_DEG * per_degree:g}")
 
 
 def _checks(name: str, bits: float, setup: Setup) -> PreflightItem:
     all_checks = 0 if name == CHECKS[0] else 1
     found, remedy = f"{bits:g}: checks before arming", f"{name} = {all_checks}, and mend what the check finds"
-    return judged(name, found, (bits != all_checks, DOUBTFUL, remedy), beyond=" are left out")
+    return judged(name, found, bits != all_checks, remedy, beyond=" are left out")
 
 
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
@@ -164,7 +154,7 @@ def sight(setup: Setup) -> PreflightItem:
     slowest_m_s = setup.threshold_m_s2 / (PULSE_PER_M_S_HZ * edge_hz)
     remedy = "a faster HIGHRES_IMU (see above): a pulse is 18 ms wide, and shows in two samples from 100 Hz on"
     found = f"from {slowest_m_s:.2f} m/s on through a filter of {edge_hz:g} Hz; {setup.false_alarms}"
-    return judged("smallest hit", found, (setup.imu_hz < 100.0, DOUBTFUL, remedy))
+    return judged("smallest hit", found, setup.imu_hz < 100.0, remedy)
 
 
 def attitude_held_s(told: Mapping[str, int | float]) -> float:

@@ -3,16 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 
-from companion.autopilot.setup import (
-    BAD,
-    DOUBTFUL,
-    PreflightItem,
-    SerialLine,
-    Setup,
-    judged,
-    judged_loss,
-    judged_settings,
-)
+from companion.autopilot.setup import PreflightItem, SerialLine, Setup, judged, judged_loss, judged_settings
 from companion.motion.config import GRAVITY_M_S2
 
 # For so long PX4 flies the last setpoint on.
@@ -63,20 +54,17 @@ def rotors(setup: Setup) -> Iterator[PreflightItem]:
     kind = setup.vehicle_type
     if kind != "quadrotor" or count != len(rotors):
         others = f"MAV_TYPE says {kind}, CA_ROTOR_COUNT {count:g}"
-        yield judged("rotors", others, (kind == "quadrotor", DOUBTFUL, "choose the airframe in QGroundControl"))
+        yield judged("rotors", others, kind == "quadrotor", "choose the airframe in QGroundControl")
         return
     guards = setup.estimate.guards
     along_m = guards.centre_m / math.sqrt(2)
     off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
     middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
     remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
+    found = f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards"
+    beyond = f"; one is {off_m:.2f} m from where that has it"
     # Further off than a guard is wide, surfaces are remembered where they are not.
-    yield judged(
-        "rotors",
-        f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards",
-        (off_m > guards.radius_m, DOUBTFUL, remedy),
-        beyond=f"; one is {off_m:.2f} m from where that has it",
-    )
+    yield judged("rotors", found, off_m > guards.radius_m, remedy, beyond=beyond)
 
 
 def port(setup: Setup) -> Iterator[PreflightItem]:
@@ -88,19 +76,19 @@ def port(setup: Setup) -> Iterator[PreflightItem]:
         remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
         is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
         beyond = ": with a cable in it PX4 may not arm"
-        yield judged("port", "PX4's USB port", (is_refused, DOUBTFUL, remedy), beyond=beyond)
+        yield judged("port", "PX4's USB port", is_refused, remedy, beyond=beyond)
         return
     ports = {number: PORTS.get(int(told.get(f"MAV_{number}_CONFIG", 0)), "") for number in INSTANCES}
     fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
     if not fitting:
         remedy = "MAV_1_CONFIG = 102 (TELEM2), SER_TEL2_BAUD as in --connect, MAV_1_MODE = 2; then reboot"
-        yield PreflightItem("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
+        yield judged("port", f"none of PX4's TELEM ports is told to have {line.baud} baud", True, remedy)
         return
     # Of two with the same rate the one that was meant for this.
     number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
     port, prefix = ports[number], f"MAV_{number}"
     remedy = f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect"
-    yield judged("port", f"{prefix} on {port}, {line.baud} baud", (line.baud < COMPANION_BAUD, DOUBTFUL, remedy))
+    yield judged("port", f"{prefix} on {port}, {line.baud} baud", line.baud < COMPANION_BAUD, remedy)
     wanted = {
         "MODE": (ONBOARD, "not the onboard streams"),
         "RATE": (0, "bytes a second at most; 0 is half of the line"),
@@ -108,10 +96,11 @@ def port(setup: Setup) -> Iterator[PreflightItem]:
     }
     for what, (wish, why) in wanted.items():
         name, value = f"{prefix}_{what}", told.get(f"{prefix}_{what}")
-        is_less = value is not None and (value != wish if what != "RATE" else 0 < value < line.baud / 20)
-        found = "the vehicle did not tell it" if value is None else f"{value:g}"
-        cases = (value is None, DOUBTFUL, "ask again"), (is_less, DOUBTFUL, f"{name} = {wish}, then reboot")
-        yield judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
+        if value is None:
+            yield judged(name, "the vehicle did not tell it", True, "ask again", mended=wish)
+            continue
+        is_less = value != wish if what != "RATE" else 0 < value < line.baud / 20
+        yield judged(name, f"{value:g}", is_less, f"{name} = {wish}, then reboot", mended=wish, beyond=f": {why}")
 
 
 def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
@@ -119,10 +108,10 @@ def _integration(name: str, rate_hz: float, setup: Setup) -> PreflightItem:
     found = f"{rate_hz:g} Hz: each sample is a mean over {mean_ms:.1f} ms"
     if rate_hz < LEAST_INTEG_HZ:
         remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
-        return judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)
+        return judged(name, found, True, remedy, mended=LEAST_INTEG_HZ)
     is_long = 1.0 / rate_hz > setup.estimate.imu_averaging_interval_s
     remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
-    return judged(name, found, (is_long, DOUBTFUL, remedy))
+    return judged(name, found, is_long, remedy)
 
 
 def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem:
@@ -134,15 +123,10 @@ def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem
 def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
     number = int(action)
     called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
-    remedy, drops, found = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS, f"{number} ({called})"
-    return judged(
-        name,
-        f"{found} when setpoints stop",
-        (drops, BAD, remedy),
-        (number in LOSS_NEEDS_STICKS, DOUBTFUL, remedy),
-        mended=LOSS_LAND,
-        beyond=": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns",
-    )
+    remedy, drops = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS
+    beyond = ": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns"
+    found, is_off = f"{number} ({called}) when setpoints stop", number in LOSS_NEEDS_STICKS
+    return judged(name, found, is_off, remedy, is_bad=drops, mended=LOSS_LAND, beyond=beyond)
 
 
 def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
@@ -153,7 +137,7 @@ def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:
     value = int(bits) | RCL_EXCEPT_OFFBOARD
     found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
     remedy = f"{name} = {value}, if the flight may go on without a radio"
-    return PreflightItem(name, DOUBTFUL, found, remedy, (name, value))
+    return judged(name, found, True, remedy, mended=value)
 
 
 def _termination(name: str, breaker: float, setup: Setup) -> PreflightItem:
@@ -161,7 +145,7 @@ def _termination(name: str, breaker: float, setup: Setup) -> PreflightItem:
         return judged(name, "a hit that tips the vehicle does not stop its motors")
     found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
     remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
-    return PreflightItem(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
+    return judged(name, found, True, remedy, mended=FLIGHTTERM_OFF)
 
 
 def _speeding_up(name: str, most_m_s2: float, setup: Setup) -> PreflightItem:
@@ -169,14 +153,14 @@ def _speeding_up(name: str, most_m_s2: float, setup: Setup) -> PreflightItem:
     lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
     found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
     remedy = f"{name} = {LEAST_ACC_HOR_M_S2:g} for `rebound guard`: a vehicle that leans in tips where it hits"
-    return judged(name, found, (most_m_s2 > LEAST_ACC_HOR_M_S2, DOUBTFUL, remedy), mended=LEAST_ACC_HOR_M_S2)
+    return judged(name, found, most_m_s2 > LEAST_ACC_HOR_M_S2, remedy, mended=LEAST_ACC_HOR_M_S2)
 
 
 def _captured(name: str, value: float, setup: Setup) -> PreflightItem:
     least = LEAST_CAPTURED[name]
     remedy = f"{name} = {least:g}; see docs/how-to/px4.md"
     beyond = ": after a hit PX4 takes its true place for an error, and may fly off"
-    return judged(name, f"{value:g}", (value < least, DOUBTFUL, remedy), mended=least, beyond=beyond)
+    return judged(name, f"{value:g}", value < least, remedy, mended=least, beyond=beyond)
 
 
 _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
@@ -210,4 +194,4 @@ def sight(setup: Setup) -> PreflightItem:
     folding = f"arms that fold: from {setup.threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
     stiff = f"stiff frames: {100 * share:.0f} % of 1 ms contacts fall into a sample"
     remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
-    return judged("smallest hit", f"{folding}; {stiff}; {setup.false_alarms}", (share <= 0.9, DOUBTFUL, remedy))
+    return judged("smallest hit", f"{folding}; {stiff}; {setup.false_alarms}", share <= 0.9, remedy)
