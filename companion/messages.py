@@ -261,8 +261,7 @@ class VehicleCommand:
     command_id: int
     parameters: tuple[float, ...]
     text: str
-    custom_mode: int | None = None
-    """Of one that asks for a mode; how it names the mode differs between autopilots (see interface.Autopilot)."""
+    custom_mode: int | None = None  # of one that asks for a mode, as the autopilot numbers it
 
 
 # MAV_CMD_COMPONENT_ARM_DISARM. By force: also where PX4 does not know that it has landed.

@@ -59,7 +59,7 @@ class Preflight:
     refusal: str | None = None
     heard_since_us: int | None = None
     parameters: dict[str, int | float] = field(default_factory=dict)
-    imu: list[messages.ImuSample] = field(default_factory=list)
+    forces: list[Vector3] = field(default_factory=list)
     positions: list[messages.LocalPosition] = field(default_factory=list)
     vibration: list[messages.Vibration] = field(default_factory=list)
     estimator: list[messages.EstimatorStatus] = field(default_factory=list)
@@ -72,21 +72,6 @@ class Preflight:
 
     def __post_init__(self) -> None:
         self.streams = StreamMonitor(self.config.streams, (MessageId.VIBRATION,))
-
-    @property
-    def setup(self) -> Setup:
-        identity, fused = self.vehicle.identity, self.config.fused
-        imu_hz = self.streams.rates_hz().get("HIGHRES_IMU", 0.0)
-        per_h = alarms_per_h(fused.noise_factor, imu_hz)
-        return Setup(
-            parameters=self.parameters,
-            line=self.line,
-            vehicle_type="" if identity is None else identity.vehicle_type,
-            estimate=self.config.estimate,
-            imu_hz=imu_hz,
-            threshold_m_s2=fused.side_threshold_m_s2,
-            false_alarms=f"at most {per_h:.2g} false alarms an hour by Gaussian vibration",
-        )
 
     @property
     def flies(self) -> bool:
@@ -133,9 +118,9 @@ class Preflight:
             outgoing.append(messages.OnboardHeartbeat(active=False))
         if self.heard_since_us is None:
             wait_s = self.config.link.heartbeat_wait_s
-            if self.refusal is None and now_us - self.started_us > wait_s * 1e6:
-                where = "check the address, the cable and the baud rate"
-                self.refusal = f"no {NAMES} was heard within {wait_s:g} s; {where}"
+            if now_us - self.started_us > wait_s * 1e6:
+                text = f"no {NAMES} was heard within {wait_s:g} s; check the address, the cable and the baud rate"
+                self.refusal = self.refusal or text
             return outgoing
         self._ask(outgoing)
         if self.streams.started_us is None and now_us - self.heard_since_us >= SETTLING_US:
@@ -164,7 +149,7 @@ class Preflight:
             case messages.TimeSync():
                 self.round_trip.update(sample, now_us)
             case messages.ImuSample() if listens:
-                self.imu.append(sample)
+                self.forces.append(sample.specific_force_frd_m_s2)
                 self.delivery.arrived(sample.time_boot_us, now_us)
             case messages.LocalPosition() if listens:
                 self.positions.append(sample)
@@ -178,14 +163,11 @@ class Preflight:
             return
         self.ask_due_us = self.now_us + ASK_AGAIN_US
         autopilot = self.vehicle.autopilot
-        asked = autopilot.asked(self.line)
-        outgoing += [messages.ReadParameter(name) for name in asked if name not in self.parameters]
-        commands: list[messages.VehicleCommand] = []
-        if self.vehicle.version is None:
-            commands.append(messages.request_message(MessageId.AUTOPILOT_VERSION))
+        outgoing += [messages.ReadParameter(name) for name in autopilot.asked(self.line) if name not in self.parameters]
+        is_known = self.vehicle.version is not None
+        commands = [] if is_known else [messages.request_message(MessageId.AUTOPILOT_VERSION)]
         if self.streams.started_us is None:
-            commands += [stream.request() for stream in self.streams.streams]
-            commands += autopilot.streams
+            commands += [*(stream.request() for stream in self.streams.streams), *autopilot.streams]
             if autopilot.lesser_imu is not None:
                 # Of a board that has no other. Where both come, the finer one counts.
                 interval_us = round(1e6 / self.config.streams.highres_imu_hz)
@@ -201,12 +183,22 @@ def spread(vectors: Sequence[Vector3]) -> float:
 
 def findings(survey: Preflight) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
-    autopilot, setup = survey.vehicle.autopilot, survey.setup
+    vehicle, fused, imu_hz = survey.vehicle, survey.config.fused, survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
+    autopilot, per_h = vehicle.autopilot, alarms_per_h(fused.noise_factor, imu_hz)
+    setup = Setup(
+        parameters=survey.parameters,
+        line=survey.line,
+        vehicle_type="" if vehicle.identity is None else vehicle.identity.vehicle_type,
+        estimate=survey.config.estimate,
+        imu_hz=imu_hz,
+        threshold_m_s2=fused.side_threshold_m_s2,
+        false_alarms=f"at most {per_h:.2g} false alarms an hour by Gaussian vibration",
+    )
     found = [item for judge in autopilot.judge_vehicle for item in judge(setup)]
     found += [*_delivery(survey), *_streams(survey)]
     found += autopilot.judge_parameters(setup)
     found += [*_estimate(survey), *_vibration(survey), _time(survey), _battery(survey)]
-    return [*found, autopilot.sight(setup)] if setup.imu_hz else found
+    return [*found, autopilot.sight(setup)] if imu_hz else found
 
 
 def _delivery(survey: Preflight) -> Iterator[PreflightItem]:
@@ -275,7 +267,7 @@ def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
         clipped = survey.vibration[-1].clipped - survey.vibration[0].clipped
         remedy = "fasten the flight controller; check the accelerometer"
         yield judged("clipping", f"{clipped} clipped samples while {doing}", is_bad=clipped != 0, remedy=remedy)
-    forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]
+    forces = survey.forces
     threshold_m_s2 = survey.config.fused.side_threshold_m_s2
     if forces and survey.flies:
         most_m_s2 = max(math.hypot(x, y) for x, y, _ in forces)

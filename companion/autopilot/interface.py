@@ -44,63 +44,45 @@ class Autopilot:
 
     name: str
     mav_autopilot: int
-    setpoints: int
-    """The mode that flies setpoints."""
+    setpoints: int  # the mode that flies setpoints
     hold: int
     land: int
-    sticks: int
-    """The mode that a pilot who moved the sticks is given."""
-    descents: frozenset[int]
-    """Modes that end on the ground."""
+    sticks: int  # the mode that a pilot who moved the sticks is given
+    descents: frozenset[int]  # modes that end on the ground
     modes: Mapping[int, Mode]
-    mode_mask: int = -1
-    """Of a mode that is not listed the one with these bits alone counts, where it is."""
-    mode_parameters: Callable[[int], tuple[int, int]]
-    """The second and the third of the command that asks for it."""
+    mode_mask: int = -1  # of a mode that is not listed the one with these bits alone counts, where it is
+    mode_parameters: Callable[[int], tuple[int, int]]  # the second and the third of the command that asks for it
+    # A parameter that is a whole number travels as a float of its value, and not as the bytes of the number.
     casts_whole_numbers: bool = False
-    """A parameter that is a whole number travels as a float of its value, and not as the bytes of the number."""
-    attitude_mask: int
-    """ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone."""
+    attitude_mask: int  # ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone
     least_version: tuple[int, int, int] = (0, 0, 0)
-    streams: tuple[VehicleCommand, ...] = ()
-    """Asked for beside those that all autopilots have."""
-    filters_imu: bool = False
-    """Its inertial samples are filtered: none shows that the raw ones were clipped."""
-    lesser_imu: MessageId | None = None
-    """Of boards that do not have HIGHRES_IMU."""
+    streams: tuple[VehicleCommand, ...] = ()  # asked for beside those that all autopilots have
+    filters_imu: bool = False  # its inertial samples are filtered: none shows that the raw ones were clipped
+    lesser_imu: MessageId | None = None  # of boards that do not have HIGHRES_IMU
     estimator_message: MessageId
     sticks_message: MessageId
-    is_told_to_take_off: bool = False
-    """Its setpoints do not lift it off the ground: a command does."""
-    wants_setpoints_first: bool
-    """It takes the mode that flies them only while they come."""
+    is_told_to_take_off: bool = False  # its setpoints do not lift it off the ground: a command does
+    wants_setpoints_first: bool  # it takes the mode that flies them only while they come
+    # What it is told when it is flown by attitude from now on (True), by position (False), or no more (None).
     changed_law: Callable[[bool | None], VehicleCommand | None]
-    """What it is told when it is flown by attitude from now on (True), by position (False), or no more (None)."""
+    # Its position control begins with the tilt that was asked for last, as what wind and a wrong tilt take.
     keeps_trim: bool = False
-    """Its position control begins with the tilt that was asked for last, as what wind and a wrong tilt take."""
-    attitude_parameters: tuple[str, ...]
-    """Read before it is flown by attitude."""
+    attitude_parameters: tuple[str, ...]  # read before it is flown by attitude
+    # From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for.
     attitude_held_s: Callable[[Mapping[str, int | float]], float]
-    """From these: for so long an attitude is flown on; infinite where no attitude with a thrust can be asked for."""
+    # After a hit its own velocity is too wrong for so long to fly by: until then a dead companion has said a tilt.
     misled_s: float
-    """After a hit its own velocity is too wrong for so long to fly by: until then a dead companion has said a tilt."""
+    # Off the obstacle: the place that is said then. None: it brakes by itself then, and is braked until then.
     last_place_m: float | None = None
-    """Off the obstacle: the place that is said then. None: it brakes by itself then, and is braked until then."""
-    loss_parameter: str
-    """For so many seconds the last setpoint is flown on."""
-    rate_parameter: str
-    """Of a link's share for streams, for people."""
-    sight: Callable[[Setup], PreflightItem]
-    """The smallest hit that shows."""
-    asked: Callable[[SerialLine | None], tuple[str, ...]]
-    """Parameters that preflight reads."""
+    loss_parameter: str  # for so many seconds the last setpoint is flown on
+    rate_parameter: str  # of a link's share for streams, for people
+    sight: Callable[[Setup], PreflightItem]  # the smallest hit that shows
+    asked: Callable[[SerialLine | None], tuple[str, ...]]  # parameters that preflight reads
     judge_vehicle: tuple[Callable[[Setup], Iterable[PreflightItem]], ...]
     judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
     remedies: Remedies
-    stick_deadzone: float
-    """Deflection around the middle that asks for no climb, by default."""
-    stick_override: float
-    """Change of a deflection by which a pilot takes over, by default."""
+    stick_deadzone: float  # deflection around the middle that asks for no climb, by default
+    stick_override: float  # change of a deflection by which a pilot takes over, by default
 
     def pilot(self, custom_mode: int) -> Pilot | None:
         """None of a mode that is not known."""

@@ -12,8 +12,7 @@ class SerialLine:
     """What the link goes through. `baud` None: the vehicle's own USB port, which has none."""
 
     baud: int | None
-    latency_timer_ms: int | None = None
-    """Of the converter's driver, where it has one."""
+    latency_timer_ms: int | None = None  # of the converter's driver, where it has one
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +25,7 @@ class Setup:
     estimate: EstimateConfig
     imu_hz: float
     threshold_m_s2: float
-    false_alarms: str
-    """By noise, for people."""
+    false_alarms: str  # by noise, for people
 
 
 class Verdict(Enum):
