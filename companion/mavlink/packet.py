@@ -1,5 +1,7 @@
 """What a MAVLink packet's header says, version 1 and 2 (mavlink.io, "Serialization"), without its dialect."""
 
+from collections.abc import Iterator
+
 MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
@@ -24,6 +26,17 @@ def packet_length(data: bytes, start: int = 0) -> int:
             return len(data) - start + 1
         return HEADER_V1 + data[start + 1] + CHECKSUM
     return 0
+
+
+def whole_packets(data: bytes) -> Iterator[bytes]:
+    """Those that bytes begin with."""
+    start = 0
+    while start < len(data):
+        length = packet_length(data, start)
+        if length == 0 or start + length > len(data):
+            return
+        yield data[start : start + length]
+        start += length
 
 
 def source_of(packet: bytes) -> tuple[int, int]:

@@ -56,14 +56,7 @@ class Reader:
 
 
 def _imu(
-    time_usec: int,
-    xacc: float,
-    yacc: float,
-    zacc: float,
-    xgyro: float,
-    ygyro: float,
-    zgyro: float,
-    fields_updated: int,
+    time_usec: int, xacc: float, yacc: float, zacc: float, xgyro: float, ygyro: float, zgyro: float, fields_updated: int
 ) -> Sample | None:
     if fields_updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
         return None

@@ -36,11 +36,7 @@ _HASH = 6
 _LINK_ID = 0  # a companion has one link
 # Radios and transponders cannot sign, so PX4 takes these as they are. Nothing here reads them: they are no news.
 _FROM_RADIOS = frozenset(
-    {
-        dialect.MAVLINK_MSG_ID_RADIO_STATUS,
-        dialect.MAVLINK_MSG_ID_ADSB_VEHICLE,
-        dialect.MAVLINK_MSG_ID_COLLISION,
-    }
+    {dialect.MAVLINK_MSG_ID_RADIO_STATUS, dialect.MAVLINK_MSG_ID_ADSB_VEHICLE, dialect.MAVLINK_MSG_ID_COLLISION}
 )
 
 UNSIGNED, FORGED, REPLAYED, OLD = "unsigned", "forged", "replayed", "old"

@@ -14,13 +14,13 @@ the vehicle learns the time from what it is sent.
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 from typing import TypeAlias
 
 from companion.autopilot.known import defaults
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.decode import KNOWN_IDS, checksum_holds
-from companion.mavlink.packet import message_id_of, packet_length, source_of
+from companion.mavlink.packet import message_id_of, source_of, whole_packets
 from companion.mavlink.signing import Signing
 from companion.messages import MessageId
 
@@ -102,14 +102,9 @@ class Peer:
 
 
 def _packets(datagram: bytes) -> Iterator[bytes]:
-    """The whole packets that a datagram begins with, their checksums right."""
-    start = 0
-    while start < len(datagram):
-        length = packet_length(datagram, start)
-        if length == 0 or start + length > len(datagram) or not checksum_holds(datagram, start, length):
-            return
-        packet = datagram[start : start + length]
-        if message_id_of(packet) not in KNOWN_IDS:
-            return
-        yield packet
-        start += length
+    """The packets of known messages that a datagram begins with, their checksums right."""
+    return takewhile(_is_known, whole_packets(datagram))
+
+
+def _is_known(packet: bytes) -> bool:
+    return message_id_of(packet) in KNOWN_IDS and checksum_holds(packet, 0, len(packet))

@@ -20,7 +20,7 @@ from queue import Empty, SimpleQueue
 
 from companion.autopilot.known import defaults
 from companion.errors import ConnectionSetupError
-from companion.mavlink.packet import packet_length
+from companion.mavlink.packet import packet_length, whole_packets
 from companion.shell.connections.connection import READ_SIZE, Way, bound_socket, plain, readable
 from companion.shell.connections.peer import LinkCounts
 
@@ -107,15 +107,8 @@ def _end_of_whole(content: bytes) -> int:
     """Where the last whole packet ends. All counts as whole where a packet should begin and none does: after a loss
     whatever is there is handed on at once.
     """
-    end = 0
-    while end < len(content):
-        length = packet_length(content, end)
-        if length == 0:
-            return len(content)
-        if end + length > len(content):
-            return end
-        end += length
-    return end
+    end = sum(map(len, whole_packets(content)))
+    return len(content) if end < len(content) and packet_length(content, end) == 0 else end
 
 
 class StreamConnection:
