@@ -223,15 +223,15 @@ def _delivery(survey: Preflight) -> Iterator[PreflightItem]:
 
 def _streams(survey: Preflight) -> Iterator[PreflightItem]:
     rates = survey.streams.rates_hz()
-    remedies = survey.vehicle.autopilot.remedies
+    autopilot = survey.vehicle.autopilot
     for stream in survey.streams.streams:
         if stream.min_hz:
             name = stream.message_id.name
             rate_hz = rates.get(name, 0.0)
             is_bad, is_less = rate_hz < stream.min_hz, rate_hz < 0.4 * stream.asked_hz
-            needed = f"at least {stream.min_hz:g} Hz are needed; {remedies.slow_streams}"
+            needed = f"at least {stream.min_hz:g} Hz are needed; {autopilot.remedy_slow_stream}"
             found = f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for"
-            yield judged(name, found, is_less, needed if is_bad else remedies.full_link, is_bad)
+            yield judged(name, found, is_less, needed if is_bad else autopilot.remedy_full_link, is_bad)
 
 
 def _estimate(survey: Preflight) -> Iterator[PreflightItem]:
@@ -246,11 +246,10 @@ def _estimate(survey: Preflight) -> Iterator[PreflightItem]:
         remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
         found = f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)"
         yield judged("position", found, wander_m > DOUBTFUL_WANDER_M, remedy, wander_m > MOST_WANDER_M)
-    remedies = survey.vehicle.autopilot.remedies
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
-        name = survey.vehicle.autopilot.estimator_message.name
-        yield judged("estimator", f"no {name}", True, remedies.no_estimator)
+        autopilot = survey.vehicle.autopilot
+        yield judged("estimator", f"no {autopilot.estimator_message.name}", True, autopilot.remedy_no_estimator)
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
         yield judged("estimator", "no horizontal velocity", is_bad=True, remedy=remedy)
@@ -286,7 +285,7 @@ def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
 def _time(survey: Preflight) -> PreflightItem:
     median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
     if median_us is None or worst_us is None:
-        return judged("time", "TIMESYNC is not answered", True, survey.vehicle.autopilot.remedies.no_time)
+        return judged("time", "TIMESYNC is not answered", True, survey.vehicle.autopilot.remedy_no_time)
     found = f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst"
     is_bad, quick = median_us > MOST_TRIP_US, "a wire instead of a radio; serial: baud rate 921600"
     remedy = "a wire or a direct link instead of this one" if is_bad else quick
@@ -296,5 +295,5 @@ def _time(survey: Preflight) -> PreflightItem:
 def _battery(survey: Preflight) -> PreflightItem:
     percent = survey.vehicle.battery_percent
     if percent is None:
-        return judged("battery", "unknown", True, survey.vehicle.autopilot.remedies.no_battery)
+        return judged("battery", "unknown", True, survey.vehicle.autopilot.remedy_no_battery)
     return judged("battery", f"{percent} %", percent < DOUBTFUL_BATTERY, "charge it", percent < BAD_BATTERY)

@@ -26,18 +26,6 @@ class Mode:
     is_guarded: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Remedies:
-    """Of what preflight finds by listening, and of a vehicle that does not arm, for people."""
-
-    slow_streams: str
-    full_link: str
-    no_time: str
-    no_battery: str
-    no_estimator: str
-    not_armed: str
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Autopilot:
     """Tables and functions of one autopilot; nothing else of the companion names its modes and parameters."""
@@ -80,7 +68,13 @@ class Autopilot:
     asked: Callable[[SerialLine | None], tuple[str, ...]]  # parameters that preflight reads
     judge_vehicle: tuple[Callable[[Setup], Iterable[PreflightItem]], ...]
     judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
-    remedies: Remedies
+    # Of what preflight finds by listening, and of a vehicle that does not arm, for people.
+    remedy_slow_stream: str
+    remedy_full_link: str
+    remedy_no_time: str
+    remedy_no_battery: str
+    remedy_no_estimator: str
+    remedy_not_armed: str
     stick_deadzone: float  # deflection around the middle that asks for no climb, by default
     stick_override: float  # change of a deflection by which a pilot takes over, by default
 

@@ -26,8 +26,6 @@ from companion.mavlink.packet import (
 from companion.mavlink.readers import ARDUPILOT_READERS, READERS, EkfStatusReport, Reader
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 
-Frame = tuple[bytes, Sample | None]
-
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
 # Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
@@ -64,10 +62,10 @@ class Decoder:
         if autopilot.casts_whole_numbers:
             self._readers = {**self._readers, **ARDUPILOT_READERS}
 
-    def feed(self, received: bytes) -> list[Frame]:
+    def feed(self, received: bytes) -> list[tuple[bytes, Sample | None]]:
         """All packets complete by now, with their samples; bytes that are no packet come as `Stray`, with None."""
         data = self._pending + received if self._pending else received
-        frames: list[Frame] = []
+        frames: list[tuple[bytes, Sample | None]] = []
         start = bad_start = 0
         end = len(data)
         while start < end:

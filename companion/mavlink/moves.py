@@ -4,9 +4,8 @@ Everything else passes, a person's words above all: sticks, every mode but OFFBO
 """
 
 import math
-from collections.abc import Mapping
 from itertools import accumulate
-from typing import Any, TypeAlias
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -14,8 +13,6 @@ from companion.autopilot.interface import Autopilot, Pilot
 from companion.mavlink.encode import IGNORE_POSITION, IGNORE_VELOCITY
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Asked, Vector3
-
-Fields: TypeAlias = Mapping[str, Any]
 
 # COMMAND_INT: a place of whole numbers that is not given.
 _NO_PLACE_INT = 0x7FFF_FFFF
@@ -69,7 +66,7 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
     return message_id in _COMMANDS and _command_moves(fields_of(packet), autopilot)
 
 
-def _command_moves(fields: Fields, autopilot: Autopilot) -> bool:
+def _command_moves(fields: dict[str, Any], autopilot: Autopilot) -> bool:
     """A reposition to no place is how QGroundControl stops the vehicle."""
     match fields["command"]:
         case dialect.MAV_CMD_DO_SET_MODE:
@@ -81,7 +78,7 @@ def _command_moves(fields: Fields, autopilot: Autopilot) -> bool:
     return fields["command"] in (dialect.MAV_CMD_DO_ORBIT, dialect.MAV_CMD_DO_FIGURE_EIGHT)
 
 
-def _has_place(fields: Fields) -> bool:
+def _has_place(fields: dict[str, Any]) -> bool:
     """Of COMMAND_INT by its whole numbers, of COMMAND_LONG by its last parameters."""
     if "x" in fields:
         return {fields["x"], fields["y"]} != {_NO_PLACE_INT} or math.isfinite(fields["z"])

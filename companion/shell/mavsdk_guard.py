@@ -164,10 +164,9 @@ class CollisionGuard:
     def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread: the sample, and at once what follows from it."""
         if packet := packet_from(name, source, fields_json):
-            with self._changed:
+            with self._changed, self._guarded():
                 if not self._is_over:
-                    with self._guarded():
-                        self._send(self._guard.step(packet, self._clock.now_us()))
+                    self._send(self._guard.step(packet, self._clock.now_us()))
         return True
 
     @contextmanager
@@ -186,13 +185,12 @@ class CollisionGuard:
         """On MAVSDK's thread, the last before the socket."""
         if name not in SETPOINTS and name not in REQUESTS:
             return True
-        with self._changed:
+        with self._changed, self._guarded():
             # Also of one that cannot be read
             passes = self._is_over or not self.holds or name in REQUESTS
             if not self._is_over and (packet := packet_from(name, source, fields_json)):
-                with self._guarded():
-                    passes = self._guard.lets_pass(packet)
-            return passes
+                passes = self._guard.lets_pass(packet)
+        return passes
 
     def _send(self, step: StepResult) -> None:
         try:

@@ -3,7 +3,7 @@
 import math
 
 from companion.autopilot.ardupilot import modes, setup
-from companion.autopilot.interface import Autopilot, Remedies
+from companion.autopilot.interface import Autopilot
 from companion.messages import MessageId, VehicleCommand, set_message_interval
 
 # RC_Channel.h: while FORCEFLYING is high, neither the crash check nor the land detector stops the motors. A recovery
@@ -55,14 +55,12 @@ ARDUPILOT = Autopilot(
     asked=setup.asked,
     judge_vehicle=(setup.frame, setup.port),
     judge_parameters=setup.judge_parameters,
-    remedies=Remedies(
-        slow_streams="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921",
-        full_link="the link is full: SERIAL2_BAUD 921",
-        no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
-        no_battery="set up the power module (BATT_MONITOR)",
-        no_estimator="look at EKF in Mission Planner",
-        not_armed="its messages in Mission Planner say why",
-    ),
+    remedy_slow_stream="serial: SERIAL2_PROTOCOL 2, SERIAL2_BAUD 921",
+    remedy_full_link="the link is full: SERIAL2_BAUD 921",
+    remedy_no_time="MAVLink 2 on the link (SERIAL2_PROTOCOL 2)",
+    remedy_no_battery="set up the power module (BATT_MONITOR)",
+    remedy_no_estimator="look at EKF in Mission Planner",
+    remedy_not_armed="its messages in Mission Planner say why",
     stick_deadzone=0.2,  # THR_DZ, of 500 from the middle
     stick_override=math.inf,  # sticks end no mode
 )

@@ -1,6 +1,6 @@
 """PX4 behind the interface of autopilots."""
 
-from companion.autopilot.interface import Autopilot, Remedies
+from companion.autopilot.interface import Autopilot
 from companion.autopilot.px4 import modes, setup
 from companion.messages import MessageId, VehicleCommand
 
@@ -41,14 +41,12 @@ PX4 = Autopilot(
     asked=setup.asked,
     judge_vehicle=(setup.rotors, setup.port),
     judge_parameters=setup.judge_parameters,
-    remedies=Remedies(
-        slow_streams="serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again",
-        full_link="the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz",
-        no_time="MAVLink 2 on the link (MAV_PROTO_VER 2)",
-        no_battery="set up the power module (BAT1_SOURCE)",
-        no_estimator="look at EKF2 in QGroundControl",
-        not_armed="`commander check` in PX4's console says why",
-    ),
+    remedy_slow_stream="serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again",
+    remedy_full_link="the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz",
+    remedy_no_time="MAVLink 2 on the link (MAV_PROTO_VER 2)",
+    remedy_no_battery="set up the power module (BAT1_SOURCE)",
+    remedy_no_estimator="look at EKF2 in QGroundControl",
+    remedy_not_armed="`commander check` in PX4's console says why",
     stick_deadzone=0.1,  # MPC_HOLD_DZ
     stick_override=0.3,  # COM_RC_STICK_OV
 )

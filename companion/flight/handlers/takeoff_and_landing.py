@@ -82,7 +82,7 @@ class TakeOff(Handler[FlightContext]):
         if outcome is None:
             return None
         if not outcome.succeeded:
-            why = flight.vehicle.said or flight.vehicle.autopilot.remedies.not_armed
+            why = flight.vehicle.said or flight.vehicle.autopilot.remedy_not_armed
             return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}")
         self._now = self._climb
         if self._is_told:
