@@ -215,7 +215,7 @@ class ExtendedState(Sample):
 @dataclass(frozen=True, slots=True)
 class CurrentMode(Sample):
     custom_mode: int
-    intended_custom_mode: int | None
+    intended_custom_mode: int | None  # the user's last request, where the message has it
 
 
 @dataclass(frozen=True, slots=True)

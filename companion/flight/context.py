@@ -12,9 +12,17 @@ from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
-from companion.link.vehicle import OLD_NEWS_US, ModeReport, Vehicle
+from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.surroundings import ObstacleMap
-from companion.messages import AttitudeSetpoint, CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
+from companion.messages import (
+    AttitudeSetpoint,
+    CommandAck,
+    CurrentMode,
+    LocalPosition,
+    Outgoing,
+    PositionSetpoint,
+    Vector3,
+)
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
@@ -249,7 +257,7 @@ class FlightContext:
         """The vehicle is about to be in the mode that it was asked for: no report of before says otherwise."""
         if (asked := self.command_client.requested_mode) is not None:
             self.expected_mode = asked
-            self.vehicle.count_mode(ModeReport(asked, None, False))
+            self.vehicle.count_mode(CurrentMode(asked, None))
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Advance the command client; report a failure."""

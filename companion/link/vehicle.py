@@ -53,17 +53,6 @@ def identify(heartbeat: messages.Heartbeat) -> Identity | str:
 
 # MAV_STATE_CRITICAL and above: PX4 says so while a failsafe acts.
 FAILSAFE_STATUS = 5
-
-
-@dataclass(frozen=True, slots=True)
-class ModeReport:
-    """The mode in one message. `intended` is the user's last request, where the message has it."""
-
-    custom_mode: int
-    intended_custom_mode: int | None
-    failsafe: bool
-
-
 # After this silence the last reported mode is old: without setpoints the vehicle has left the mode that flies them. A
 # later setpoint would take the vehicle away from whoever has it then.
 OLD_NEWS_US = defaults.LOSS_US
@@ -85,7 +74,8 @@ class Vehicle:
     version: tuple[int, int, int] | None = None
     attitude_parameters: dict[str, int | float] = field(default_factory=dict)  # see interface.Autopilot
     armed: bool | None = None
-    mode: ModeReport | None = None
+    mode: messages.CurrentMode | None = None
+    is_failsafe_mode: bool = False  # as far as its report says
     chosen_mode: int | None = None  # by whoever flies
     tells_chosen: bool = False  # in a message of its own
     pilot: Pilot | None = None  # who moves it, where that mode says so
@@ -101,7 +91,7 @@ class Vehicle:
     last_position_us: int | None = None
     mode_received_us: int = 0
     unsure_since_us: int = -1  # only a report of the mode that is newer than this says who has the vehicle
-    unconfirmed_mode: ModeReport | None = None  # reported once, and not the companion's
+    unconfirmed_mode: messages.CurrentMode | None = None  # reported once, and not the companion's
     is_disarm_unconfirmed: bool = False  # reported once, in the air
     is_disarm_unexplained: bool = False  # and not yet contradicted by a vehicle that says that it flies
     conflicts: int = 0
@@ -130,14 +120,14 @@ class Vehicle:
                 is_choice = not self.failsafe or not self.autopilot.wants_setpoints_first
                 if is_choice and not self.tells_chosen:
                     self.chosen_mode = sample.custom_mode
-                self._update_mode(ModeReport(sample.custom_mode, None, self.failsafe), own_modes, now_us)
+                report = messages.CurrentMode(sample.custom_mode, None)
+                self._update_mode(report, self.failsafe, own_modes, now_us)
             case messages.CurrentMode():
+                intended = sample.intended_custom_mode
+                if intended is not None:
+                    self.chosen_mode, self.tells_chosen = intended, True
                 # The intended mode is newer than the last HEARTBEAT's status, where it is given.
-                failsafe = self.failsafe and sample.intended_custom_mode is None
-                if sample.intended_custom_mode is not None:
-                    self.chosen_mode, self.tells_chosen = sample.intended_custom_mode, True
-                report = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
-                self._update_mode(report, own_modes, now_us)
+                self._update_mode(sample, self.failsafe and intended is None, own_modes, now_us)
             case messages.ExtendedState():
                 self.landed_us = self.landed_us if sample.landed_state is self.landed else now_us
                 self.landed = sample.landed_state
@@ -151,19 +141,21 @@ class Vehicle:
             case messages.AutopilotVersion():
                 self.version = sample.flight_version
 
-    def _update_mode(self, report: ModeReport, own_modes: tuple[int | None, ...], now_us: int) -> None:
+    def _update_mode(
+        self, report: messages.CurrentMode, failsafe: bool, own_modes: tuple[int | None, ...], now_us: int
+    ) -> None:
         self.mode_received_us = now_us
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
         if is_known or not own_modes or self.unconfirmed_mode is not None:
             self.conflicts += is_known and self.unconfirmed_mode is not None
-            self.count_mode(report)
+            self.count_mode(report, failsafe)
             self.unconfirmed_mode = None
         else:
             self.unconfirmed_mode = report
 
-    def count_mode(self, report: ModeReport) -> None:
+    def count_mode(self, report: messages.CurrentMode, failsafe: bool = False) -> None:
         """It is the vehicle's from now on."""
-        self.mode, self.pilot = report, self.autopilot.pilot(report.custom_mode)
+        self.mode, self.is_failsafe_mode, self.pilot = report, failsafe, self.autopilot.pilot(report.custom_mode)
 
     def _update_armed(self, armed: bool) -> None:
         is_on_ground = self.landed is messages.LandedState.ON_GROUND

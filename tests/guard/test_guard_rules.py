@@ -9,8 +9,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.machine import GuardCore, has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import goes_down, observe
-from companion.link.vehicle import ModeReport
-from companion.messages import Heartbeat, LandedState, PositionTarget, Sticks
+from companion.messages import CurrentMode, Heartbeat, LandedState, PositionTarget, Sticks
 from companion.motion.config import SAME_M_S
 
 
@@ -69,7 +68,7 @@ ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
 
 def test_a_mode_that_the_vehicle_is_about_to_be_in_says_who_flies_it():
     guard = GuardCore(GuardConfig()).flight
-    guard.vehicle.count_mode(ModeReport(MANUAL, None, False))
+    guard.vehicle.count_mode(CurrentMode(MANUAL, None))
     guard.ask_for_mode(PX4.setpoints)
     guard.count_asked_mode()
     assert (guard.vehicle.custom_mode, guard.vehicle.pilot) == (PX4.setpoints, Pilot.SETPOINTS)
@@ -77,7 +76,7 @@ def test_a_mode_that_the_vehicle_is_about_to_be_in_says_who_flies_it():
 
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
     guard = GuardCore(GuardConfig()).flight
-    guard.vehicle.mode, guard.vehicle.landed = ModeReport(mode, None, False), landed
+    guard.vehicle.mode, guard.vehicle.landed = CurrentMode(mode, None), landed
     guard.vehicle.pilot = PX4.pilot(mode)
     observe(guard, samples, 0)
     return goes_down(guard, now_us)

@@ -149,7 +149,7 @@ def who_decided(flight: FlightContext, requested_mode: int | None) -> Literal["f
         return None
     intended_mode = report.intended_custom_mode
     still_intended = intended_mode is not None and intended_mode in (expected_mode, requested_mode)
-    return "failsafe" if report.failsafe or still_intended else "pilot"
+    return "failsafe" if flight.vehicle.is_failsafe_mode or still_intended else "pilot"
 
 
 # Where setpoints were late, or lost on the way, PX4 leaves OFFBOARD and takes it again by itself 0.09 s
