@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
-from companion.mavlink.decode import Decoder, checksum_holds
+from companion.mavlink.decode import Decoder
 from companion.mavlink.moves import SETPOINT_IDS, STICKS_IDS, asked_by, fields_of, interval_asked, is_for, would_move
-from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, message_id_of
+from companion.mavlink.packet import MAGIC_V1, MAGIC_V2, Stray, checksum_holds, message_id_of
 from companion.messages import Asked
 
 # Of a client, still to be sent: a download of all parameters or a long mission is less.

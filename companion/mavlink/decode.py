@@ -6,37 +6,18 @@ Packets are found by their header here, so that the many the companion has no us
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
-from companion.mavlink.packet import (
-    CHECKSUM,
-    MAGIC_V1,
-    MAGIC_V2,
-    SIGNATURE,
-    Stray,
-    has_signature,
-    message_id_of,
-    packet_length,
-    payload_of,
-    source_of,
-)
-from companion.mavlink.readers import ARDUPILOT_READERS, READERS, EkfStatusReport, Reader
+from companion.mavlink.packet import Stray, checksum_holds, message_id_of, packet_length, payload_of, source_of
+from companion.mavlink.readers import ARDUPILOT_READERS, READERS, Reader
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
 # Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
 SAME_BOOT_US = 3_600_000_000
-# What the checksum counts beside the packet: CRC_EXTRA, by message id. Packets with other ids have one that cannot be
-# checked.
-_CRC_EXTRA = {
-    number: bytes((message.crc_extra,))
-    for number, message in (dialect.mavlink_map | {EkfStatusReport.id: EkfStatusReport}).items()
-}
-KNOWN_IDS = frozenset(_CRC_EXTRA)
 
 
 class Decoder:
@@ -48,10 +29,10 @@ class Decoder:
     """
 
     def __init__(
-        self, readers: Mapping[int, Reader] = READERS, is_packet: Callable[[bytes, int, int], bool] | None = None
+        self, readers: Mapping[int, Reader] = READERS, is_packet: Callable[[bytes, int, int], bool] = checksum_holds
     ) -> None:
         """`is_packet`: whether bytes, from a start on and of a length, are a packet; by default the checksum tells."""
-        self._readers, self._is_packet = readers, is_packet or checksum_holds
+        self._readers, self._is_packet = readers, is_packet
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
         self._has_highres_imu = False
@@ -106,16 +87,3 @@ class Decoder:
             # Far from the newest one it has not wrapped: the vehicle has rebooted.
             return replace(sample, time_boot_us=stamp_us) if abs(stamp_us - self._boot_us) < SAME_BOOT_US else sample
         return sample
-
-
-def checksum_holds(data: bytes, start: int, length: int) -> bool:
-    """Whether the packet's own checksum holds; of a message that is not in the dialect, whether it ends where another
-    packet begins.
-    """
-    packet, end = data[start : start + length], start + length
-    crc_extra = _CRC_EXTRA.get(message_id_of(packet))
-    if crc_extra is None:
-        return end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2)
-    checked = length - CHECKSUM - (SIGNATURE if has_signature(packet) else 0)
-    checksum: int = mcrf4xx(packet[1:checked] + crc_extra)
-    return packet[checked : checked + CHECKSUM] == checksum.to_bytes(CHECKSUM, "little")

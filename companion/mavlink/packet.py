@@ -1,10 +1,20 @@
-"""What a MAVLink packet's header says, version 1 and 2 (mavlink.io, "Serialization"), without its dialect."""
+"""Where a MAVLink packet is, version 1 and 2 (mavlink.io, "Serialization"), and what its header says."""
 
 from collections.abc import Iterator
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.messages import MessageId
 
 MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
+# What the checksum counts beside the packet: CRC_EXTRA, by message id. Packets with other ids have one that cannot be
+# checked.
+_CRC_EXTRA = {number: bytes((message.crc_extra,)) for number, message in dialect.mavlink_map.items()}
+_CRC_EXTRA[MessageId.EKF_STATUS_REPORT] = bytes((71,))  # ArduPilot's (see readers)
+KNOWN_IDS = frozenset(_CRC_EXTRA)
 
 
 class Stray(bytes):
@@ -61,3 +71,16 @@ def payload_of(packet: bytes) -> bytes:
     """MAVLink 2 leaves out the zeros at its end."""
     start = HEADER_V2 if packet[0] == MAGIC_V2 else HEADER_V1
     return packet[start : start + packet[1]]
+
+
+def checksum_holds(data: bytes, start: int, length: int) -> bool:
+    """Whether the packet's own checksum holds; of a message that is not in the dialect, whether it ends where another
+    packet begins.
+    """
+    packet, end = data[start : start + length], start + length
+    crc_extra = _CRC_EXTRA.get(message_id_of(packet))
+    if crc_extra is None:
+        return end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2)
+    checked = length - CHECKSUM - (SIGNATURE if has_signature(packet) else 0)
+    checksum: int = mcrf4xx(packet[1:checked] + crc_extra)
+    return packet[checked : checked + CHECKSUM] == checksum.to_bytes(CHECKSUM, "little")

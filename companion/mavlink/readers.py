@@ -237,7 +237,7 @@ def _estimator_status(flags: int, vel_ratio: float, pos_horiz_ratio: float, pos_
 class EkfStatusReport:
     """ArduPilot's message of that name, which is in none of the dialects that PX4 speaks."""
 
-    id, msgname, crc_extra = 193, "EKF_STATUS_REPORT", 71
+    id, msgname = messages.MessageId.EKF_STATUS_REPORT, "EKF_STATUS_REPORT"
     unpacker = struct.Struct("<fffffHf")
     ordered_fieldnames = (
         *("velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance"),

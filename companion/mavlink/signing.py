@@ -11,12 +11,13 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.link.refusals import Refusals
-from companion.mavlink.decode import Decoder, checksum_holds
+from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import (
     FLAG_SIGNED,
     HEADER_V2,
     MAGIC_V2,
     SIGNATURE,
+    checksum_holds,
     has_signature,
     message_id_of,
     packet_length,

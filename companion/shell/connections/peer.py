@@ -19,8 +19,7 @@ from typing import TypeAlias
 
 from companion.autopilot.known import defaults
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
-from companion.mavlink.decode import KNOWN_IDS, checksum_holds
-from companion.mavlink.packet import message_id_of, source_of, whole_packets
+from companion.mavlink.packet import KNOWN_IDS, checksum_holds, message_id_of, source_of, whole_packets
 from companion.mavlink.signing import Signing
 from companion.messages import MessageId
 
