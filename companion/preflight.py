@@ -266,17 +266,17 @@ def _vibration(survey: Preflight) -> Iterator[PreflightItem]:
         clipped = survey.vibration[-1].clipped - survey.vibration[0].clipped
         remedy = "fasten the flight controller; check the accelerometer"
         yield judged("clipping", f"{clipped} clipped samples while {doing}", is_bad=clipped != 0, remedy=remedy)
-    forces = survey.forces
-    threshold_m_s2 = survey.config.fused.side_threshold_m_s2
-    if forces and survey.flies:
-        most_m_s2 = max(math.hypot(x, y) for x, y, _ in forces)
+    if not survey.forces:
+        return
+    shakes_m_s2, threshold_m_s2 = spread(survey.forces), survey.config.fused.side_threshold_m_s2
+    if survey.flies:
+        most_m_s2 = max(math.hypot(x, y) for x, y, _ in survey.forces)
         remedy = "balance or replace propellers, tighten motors, soften the mount; then `rebound tune` on this flight"
         found = (
-            f"{spread(forces):.2f} m/s^2 (RMS) hovering; sideways {most_m_s2:.1f} of {threshold_m_s2:g} that tell a hit"
+            f"{shakes_m_s2:.2f} m/s^2 (RMS) hovering; sideways {most_m_s2:.1f} of {threshold_m_s2:g} that tell a hit"
         )
         yield judged("vibration", found, most_m_s2 >= threshold_m_s2, remedy)
-    elif forces:
-        shakes_m_s2 = spread(forces)
+    else:
         remedy = "let the vehicle stand still, motors off, and ask again"
         found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
         yield judged("shaking", found, shakes_m_s2 > STANDS_M_S2, remedy)

@@ -145,8 +145,8 @@ def test_a_port_whose_driver_does_not_return_is_waited_for_by_nobody(by_id, clos
     waiting, going_on = os.pipe()
     link = by_id / "vehicle"
     line = closing(Line(link))
-    opens = streams.SerialDevice.open
-    monkeypatch.setattr(streams.SerialDevice, "open", lambda device: os.read(waiting, 1) and opens(device))
+    opens = streams.SerialConnection._device
+    monkeypatch.setattr(streams.SerialConnection, "_device", lambda line: os.read(waiting, 1) and opens(line))
     os.write(going_on, b"1")
     connection = closing(open_connection(f"serial://{line.path}:115200"))
     line.close()

@@ -17,7 +17,7 @@ from companion.errors import AddressError, ConnectionSetupError
 from companion.mavlink.signing import Signing
 from companion.shell.connections.connection import ANY_HOST, UdpConnection, resolve, udp_in, udp_out
 from companion.shell.connections.peer import Peer
-from companion.shell.connections.streams import StreamConnection, TcpInConnection, serial_port, tcp_out
+from companion.shell.connections.streams import SerialConnection, StreamConnection, TcpInConnection, tcp_out
 
 # To a vehicle. Both have a descriptor, None while there is nothing that bytes could come from.
 Opened: TypeAlias = UdpConnection | StreamConnection
@@ -50,7 +50,7 @@ def open_connection(url: str, peer: str | None = None, signing: Signing | None =
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     match scheme:
         case "serial":
-            return serial_port(host, port, waits)
+            return SerialConnection(host, port, waits)
         case "udpin":
             return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
         case "tcpin":

@@ -237,19 +237,27 @@ def _set_up(connected: socket.socket) -> None:
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
 
 
-class SerialDevice:
-    """A device, and the names by which it is found again when it is plugged in anew.
+class SerialConnection(StreamConnection):
+    """A device, found again when it is plugged in anew. One that may not be opened is waited for by nobody: that is a
+    matter of rights.
 
     While it is open, udev's links that lead to it are remembered. Where there are any, it is looked for by these alone:
     its old path may be another device's by now.
     """
 
-    def __init__(self, path: str, baud: int) -> None:
+    def __init__(self, path: str, baud: int, waits: bool = False) -> None:
         self._path, self._baud = path, baud
         self._links: list[Path] = []
+        missing = None if os.path.exists(path) else f"Serial port {path} does not exist: is the cable plugged in?"
+        if missing is not None and not waits:
+            raise ConnectionSetupError(missing)
+        try:
+            stream = self._device() if missing is None else None
+        except (OSError, ValueError) as error:
+            raise ConnectionSetupError(f"Serial port {path} cannot be opened: {plain(error)}.") from error
+        super().__init__(stream, self._device, missing)
 
-    def open(self) -> Stream:
-        """Raises OSError, ValueError."""
+    def _device(self) -> Stream:
         import serial  # only here: it costs start-up time
 
         links = [link for link in self._links if link.exists()]
@@ -261,18 +269,3 @@ class SerialDevice:
         device = Path(path).resolve()
         self._links = sorted(link for link in SERIAL_BY_ID.glob("*") if link.resolve() == device)
         return stream
-
-
-def serial_port(path: str, baud: int, waits: bool = False) -> StreamConnection:
-    """A port that may not be opened is waited for by nobody: that is a matter of rights."""
-    device = SerialDevice(path, baud)
-    if not os.path.exists(path):
-        text = f"Serial port {path} does not exist: is the cable plugged in?"
-        if waits:
-            return StreamConnection(None, device.open, text)
-        raise ConnectionSetupError(text)
-    try:
-        stream = device.open()
-    except (OSError, ValueError) as error:
-        raise ConnectionSetupError(f"Serial port {path} cannot be opened: {plain(error)}.") from error
-    return StreamConnection(stream, device.open)
