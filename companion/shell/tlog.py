@@ -56,10 +56,8 @@ class TlogWriter:
 
     def close(self) -> None:
         if not self._file.closed:
-            try:
+            with self._file:
                 self.flush()
-            finally:
-                self._file.close()
 
 
 def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
