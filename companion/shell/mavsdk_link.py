@@ -34,9 +34,8 @@ class MavsdkLink:
         self._mavsdk = getattr(mavsdk, "_mavsdk", mavsdk)
         system = getattr(system, "_system", system)
         if not hasattr(self._mavsdk, "_handle") or not hasattr(system, "get_system_id"):
-            raise GuardError(
-                "CollisionGuard wants MAVSDK's Mavsdk object and a System of it: CollisionGuard(mavsdk, system)."
-            )
+            text = "CollisionGuard wants MAVSDK's Mavsdk object and a System of it: CollisionGuard(mavsdk, system)."
+            raise GuardError(text)
         self._message_class = direct.MavlinkMessage
         self._callback_class = ctypes.CFUNCTYPE(ctypes.c_int, direct.MavlinkMessageCStruct, ctypes.c_void_p)
         self._direct = direct.MavlinkDirect(system)

@@ -126,7 +126,6 @@ def _peer(text: str, listening: str) -> tuple[str, int | None]:
         _, address = resolve(host, 0, family)
     except ConnectionSetupError as error:
         version = "IPv6" if family == socket.AF_INET6 else "IPv4"
-        raise ConnectionSetupError(
-            f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
-        ) from error
+        says = f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
+        raise ConnectionSetupError(says) from error
     return str(address[0]), int(port) if port else None
