@@ -100,20 +100,6 @@ class ObstacleMap:
         off_m = self.clearance_m - LEVEL_SLACK_M
         return min(from_m, to_m) < top_m + off_m and max(from_m, to_m) > bottom_m - off_m
 
-    def levels_m(self) -> list[float]:
-        """Heights just above walls and floors and just below ceilings, inside the fence."""
-        levels = set[float]()
-        for patch in self.patches:
-            bottom_m, top_m = patch.assumed_heights_m()
-            is_above = patch.normal_ned[2] > 0.0
-            levels.add(bottom_m - self.clearance_m if is_above else top_m + self.clearance_m)
-        return sorted(level for level in levels if self.fence.min_height_m <= level <= self.fence.max_height_m)
-
-    def is_capped(self, start: Place, from_m: float, to_m: float) -> bool:
-        """Whether a ceiling, or a floor, is between the vehicle and another height."""
-        steep = [patch for patch in self.patches if patch.is_steep and self._meets(patch, from_m, to_m)]
-        return any(assumed_area(patch, 0.0).distance(Point(start)) < self.reach_m for patch in steep)
-
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
         """Whether a line through these points comes too near to a patch."""
         heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
