@@ -7,8 +7,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from companion.messages import Vector3
-from companion.motion.vector import ZERO, along, minus, plus
+from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import PLACE_SPREAD_M
 from companion.reflex.surface import Normal, away_from, is_from_behind
 
@@ -52,6 +54,11 @@ class Patch:
         """Of a wall: how far a place is from the centre, to the right of someone who looks along the normal."""
         (n, e, _), (north, east, _) = self.centre_ned_m, self.normal_ned
         return -(place_ned_m[0] - n) * east + (place_ned_m[1] - e) * north
+
+    def place_ne_m(self, along_m: float, off_m: float = 0.0) -> tuple[float, float]:
+        """Of a wall: the place, in plan, that is so far along it and in front of its plane."""
+        (n, e, _), (north, east, _) = self.centre_ned_m, self.normal_ned
+        return (n + off_m * north - along_m * east, e + off_m * east + along_m * north)
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """How far a place is in front of the surface's plane."""
@@ -120,11 +127,7 @@ LEAST_SPEED_M_S = 0.3
 
 
 def touch_of(
-    centre_ned_m: Vector3,
-    velocity_ned_m_s: Vector3,
-    normal: Normal,
-    reach_m: float,
-    found_at_us: int,
+    centre_ned_m: Vector3, velocity_ned_m_s: Vector3, normal: Normal, reach_m: float, found_at_us: int
 ) -> Patch | None:
     """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
 
@@ -162,19 +165,14 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
 
 def joined(patches: Sequence[Patch], touch: Patch) -> Patch:
     """The touch and the patches of its surface as one; the normal by the means, then by places that lie far apart."""
-    parts = [*patches, touch]
-    weights = [part.hits / max(part.normal_error_rad, 1e-3) ** 2 for part in parts]
-    total = sum(weights)
-    n, e, d = (
-        sum(weight * part.normal_ned[axis] for weight, part in zip(weights, parts, strict=True)) for axis in range(3)
-    )
-    size = math.sqrt(n * n + e * e + d * d)
-    # Normals of one surface have errors in common (friction leans all alike): the mean is no better than the best.
-    error_rad = min(part.normal_error_rad for part in parts)
+    parts, normal = [*patches, touch], ZERO
+    for part in parts:
+        normal = plus(normal, part.hits / max(part.normal_error_rad, 1e-3) ** 2, part.normal_ned)
     patch = Patch(
         touches_ned_m=tuple(place for part in parts for place in part.touches_ned_m),
-        normal_ned=(n / size, e / size, d / size) if size > 1e-6 * total else touch.normal_ned,
-        normal_error_rad=error_rad,
+        normal_ned=unit(normal),
+        # Normals of one surface have errors in common (friction leans all alike): the mean is no better than the best.
+        normal_error_rad=min(part.normal_error_rad for part in parts),
         reaches_m=max(part.reaches_m for part in parts),
         found_at_us=min(part.found_at_us for part in parts),
     )
@@ -183,22 +181,15 @@ def joined(patches: Sequence[Patch], touch: Patch) -> Patch:
 
 def _turned_to_places(patch: Patch) -> Patch:
     """A wall's normal square to the line through its touches (least squares), as far as those are apart enough."""
-    (north, east, _), places = mean_of(patch.touches_ned_m), patch.touches_ned_m
-    nn = sum((n - north) ** 2 for n, _, _ in places)
-    ee = sum((e - east) ** 2 for _, e, _ in places)
-    ne = sum((n - north) * (e - east) for n, e, _ in places)
     low_m, high_m = patch.touched_along_m()
-    base_m = high_m - low_m
-    if base_m < LEAST_BASE_M:
+    error_rad = math.atan2(2.0 * PLACE_SPREAD_M, high_m - low_m)
+    if high_m - low_m < LEAST_BASE_M or error_rad >= patch.normal_error_rad:
         return patch
-    error_rad = math.atan(2.0 * PLACE_SPREAD_M / base_m)
-    if error_rad >= patch.normal_error_rad:
-        return patch
+    (nn, ne), (_, ee) = np.cov(np.transpose(patch.touches_ned_m)[:2]).tolist()
     along_rad = 0.5 * math.atan2(2.0 * ne, nn - ee)
     normal = (-math.sin(along_rad), math.cos(along_rad), 0.0)
-    if normal[0] * patch.normal_ned[0] + normal[1] * patch.normal_ned[1] < 0.0:
-        normal = (-normal[0], -normal[1], 0.0)
-    return replace(patch, normal_ned=normal, normal_error_rad=error_rad)
+    is_back = along(normal, patch.normal_ned) < 0.0
+    return replace(patch, normal_ned=minus(ZERO, normal) if is_back else normal, normal_error_rad=error_rad)
 
 
 def _outside_m(value: float, bounds: tuple[float, float]) -> float:

@@ -23,7 +23,7 @@ START, GOAL = 0, 1
 
 def route(known: ObstacleMap, start_ned_m: Vector3, goal_ned_m: Vector3) -> tuple[Vector3, ...] | None:
     """The places to fly to, one after the other, the goal last; None when there is no way that is known to be free."""
-    here = known.between(-start_ned_m[2], -goal_ned_m[2], start_ned_m)
+    here = known.between((start_ned_m, goal_ned_m), start_ned_m)
     places = _search(here, start_ned_m[:2], goal_ned_m[:2])
     if places is None:
         return None

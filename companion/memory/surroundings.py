@@ -24,8 +24,6 @@ ROUNDING_M = 0.02
 # A goal may lie nearer to a surface than the clearance. A touch's place is good to 0.1 m (see patch); 5 cm more between
 # guards and surface make it safe to fly to.
 LEAST_FREE_M = 0.15
-# A level this near to the bound of a patch's heights is beside it.
-LEVEL_SLACK_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -72,19 +70,37 @@ class ObstacleMap:
             patches.append(joined(fitting, touch))
         return replace(self, patches=tuple(patches))
 
-    def between(self, from_m: float, to_m: float, start_ned_m: Vector3) -> "ObstacleMap":
-        """What of it stands between two heights, for a vehicle that starts there."""
-        here = [patch for patch in self.patches if self._meets(patch, from_m, to_m)]
-        return replace(self, patches=tuple(patch for patch in here if not _is_within(patch, start_ned_m)))
+    def between(self, points_ned_m: Sequence[Vector3], start_ned_m: Vector3) -> "ObstacleMap":
+        """What of it stands at the heights of these points and between them, for a vehicle that starts there."""
+        heights_m = [-point[2] for point in points_ned_m]
+        low_m, high_m = min(heights_m) - self.clearance_m, max(heights_m) + self.clearance_m
+
+        def stands(patch: Patch) -> bool:
+            bottom_m, top_m = patch.assumed_heights_m()
+            if top_m <= low_m or bottom_m >= high_m:
+                return False
+            # A patch in which the vehicle itself is cannot be there, or not any more.
+            is_beside = not bottom_m <= -start_ned_m[2] <= top_m
+            return is_beside or assumed_area(patch, 0.0).distance(Point(start_ned_m[:2])) >= 2.0 * ROUNDING_M
+
+        return replace(self, patches=tuple(filter(stands, self.patches)))
 
     def holds(self, place: Place) -> bool:
         """Whether a place lies in one of the patches, for a vehicle that has a size."""
         return bool(np.any(shapely.distance(Point(place), self.cores) < self.least_m))
 
     def keeps_off(self, line: BaseGeometry, ends: Sequence[Place]) -> bool:
-        """Whether a line keeps the clearance, or what these of its ends leave of it, and stays off the cores."""
-        is_clear = _keeps(line, ends, self.areas, self.clearance_m - SLACK_M)
-        return is_clear and _keeps(line, ends, self.cores, self.least_m)
+        """Whether a line keeps the clearance, or what these of its ends leave of it.
+
+        It stays off the cores, and never leads through a shape that the ends are outside of.
+        """
+        for shapes, off_m in ((self.areas, self.clearance_m - SLACK_M), (self.cores, self.least_m)):
+            needs_m = np.full(len(shapes), off_m)
+            for end in ends:
+                needs_m = np.minimum(needs_m, shapely.distance(Point(end), shapes) - ROUNDING_M)
+            if np.any(shapely.distance(line, shapes) < needs_m):
+                return False
+        return True
 
     def grown(self, by_m: float) -> BaseGeometry:
         """The assumed areas as one, grown by `by_m` on every side."""
@@ -92,34 +108,12 @@ class ObstacleMap:
 
     def is_clear(self, place_ned_m: Vector3, start_ned_m: Vector3) -> bool:
         """Whether a place keeps the whole clearance."""
-        here = self.between(-place_ned_m[2], -place_ned_m[2], start_ned_m)
-        return here.keeps_off(Point(place_ned_m[:2]), ())
-
-    def _meets(self, patch: Patch, from_m: float, to_m: float) -> bool:
-        bottom_m, top_m = patch.assumed_heights_m()
-        off_m = self.clearance_m - LEVEL_SLACK_M
-        return min(from_m, to_m) < top_m + off_m and max(from_m, to_m) > bottom_m - off_m
+        return self.between([place_ned_m], start_ned_m).keeps_off(Point(place_ned_m[:2]), ())
 
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
         """Whether a line through these points comes too near to a patch."""
-        heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
-        here = self.between(min(heights), max(heights), points_ned_m[0])
+        here, places = self.between(points_ned_m, points_ned_m[0]), [point[:2] for point in points_ned_m]
         return here.holds(places[-1]) or not here.keeps_off(LineString(places), (places[0], places[-1]))
-
-
-def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
-    """A patch in which the vehicle itself is cannot be there, or not any more."""
-    bottom_m, top_m = patch.assumed_heights_m()
-    is_level = bottom_m <= -place_ned_m[2] <= top_m
-    return is_level and assumed_area(patch, 0.0).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
-
-
-def _keeps(line: BaseGeometry, ends: Sequence[Place], shapes: Sequence[BaseGeometry], off_m: float) -> bool:
-    """Off every shape by `off_m`, or as far as the ends are; never through a shape that the ends are outside of."""
-    needs_m = np.full(len(shapes), off_m)
-    for end in ends:
-        needs_m = np.minimum(needs_m, shapely.distance(Point(end), shapes) - ROUNDING_M)
-    return bool(np.all(shapely.distance(line, shapes) >= needs_m))
 
 
 # Nobody knows how thick what was hit is; thinner than an inner wall is rare.
@@ -137,15 +131,9 @@ def assumed_area(patch: Patch, error_rad: float) -> BaseGeometry:
         return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
     low_m, high_m = patch.assumed_along_m()
     drift_m = (patch.touched_along_m()[0] - low_m) * math.sin(error_rad)
-    (north, east, _), (ahead_n, ahead_e, _) = patch.centre_ned_m, patch.normal_ned
     offs_m = [patch.off_m(place) for place in patch.touches_ned_m]
     back_m, front_m = min(offs_m) - max(THICKNESS_M, drift_m), max(offs_m) + drift_m
     # A touch without an assumed extent is as wide as it is thick.
     low_m, high_m = min(low_m, high_m - THICKNESS_M), max(high_m, low_m + THICKNESS_M)
     corners = ((low_m, back_m), (low_m, front_m), (high_m, front_m), (high_m, back_m))
-    return Polygon(
-        [
-            (north + off_m * ahead_n - along_m * ahead_e, east + off_m * ahead_e + along_m * ahead_n)
-            for along_m, off_m in corners
-        ]
-    )
+    return Polygon([patch.place_ne_m(along_m, off_m) for along_m, off_m in corners])

@@ -4,24 +4,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeAlias
 
-from companion.fence import Fence
 from companion.memory.route import route
 from companion.memory.surroundings import ROUNDING_M, ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
 from companion.mission.trajectory import LEAST_GAP_M, Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
-from companion.motion.vector import minus
+from companion.motion.vector import along, flat, minus, plus, unit
 
 # Least acceleration against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
 # A retry slower than this may touch without a detection, and push until its time-out.
 LEAST_TRY_M_S = 0.3
-
-# Speed, acceleration, and that while the speed grows.
-SpeedAndAccelerations: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +41,17 @@ class SpeedLimits:
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
         return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration)
 
-    def against(self, wind_m_s2: Vector3, along: Vector3) -> "SpeedLimits":
-        """With the acceleration that a head wind leaves; `wind_m_s2`: the horizontal acceleration that balances the
-        wind in hover, north and east.
-        """
-        distance_m = math.hypot(along[0], along[1])
-        head_m_s2 = (wind_m_s2[0] * along[0] + wind_m_s2[1] * along[1]) / distance_m if distance_m > 0.0 else 0.0
+    def against(self, wind_m_s2: Vector3, way: Vector3) -> "SpeedLimits":
+        """With the acceleration that a head wind leaves; `wind_m_s2`: what balances the wind in hover, horizontal."""
+        head_m_s2 = max(0.0, along(wind_m_s2, unit(flat(way))))
         least = min(LEAST_SPEEDING_UP_M_S2, self.speeding_up_m_s2)
-        return replace(self, speeding_up_m_s2=max(least, self.speeding_up_m_s2 - max(0.0, head_m_s2)))
+        return replace(self, speeding_up_m_s2=max(least, self.speeding_up_m_s2 - head_m_s2))
 
-    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> SpeedAndAccelerations:
-        """Speed and acceleration of an item, or else the present ones; and the acceleration while the speed grows."""
-        speed = self.speed_m_s if speed_m_s is None else speed_m_s
-        acceleration = self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
-        return self.slowed_m_s(speed), acceleration, self.speeding_up_m_s2
-
-    def slowed_m_s(self, speed_m_s: float) -> float:
-        return max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
+    def limits(self, item: items.Motion | items.ReturnItem) -> tuple[float, float, float]:
+        """Speed and acceleration, the item's or the present ones; and the acceleration while the speed grows."""
+        speed_m_s = items.speed_m_s(item) or self.speed_m_s
+        slowed_m_s = max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
+        return slowed_m_s, getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
 
 
 def climb(start_m: Vector3, height_m: float, config: FlightConfig, most_m_s: float) -> LineProfile:
@@ -77,47 +66,41 @@ def stay(place_m: Vector3) -> LineProfile:
 
 def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
     """The vector to the item's first point; of an orbit, to its centre, as all directions follow."""
-    if isinstance(item, items.VelocityItem):
-        return item.velocity_ned_m_s
-    first = item.centre_ned_m if isinstance(item, items.OrbitItem) else _points_of(item)[0]
-    return minus(first, start_m)
+    match item:
+        case items.VelocityItem(velocity_ned_m_s=velocity):
+            return velocity
+        case items.GoToItem(position_ned_m=first) | items.OrbitItem(centre_ned_m=first):
+            return minus(first, start_m)
+        case items.PathItem(points_ned_m=points):
+            return minus(points[0], start_m)
 
 
 def trajectory_of(item: items.Motion, start_m: Vector3, speeds: SpeedLimits) -> Trajectory:
     """The item's trajectory from the present setpoint."""
-    if isinstance(item, items.VelocityItem):
-        return _with_velocity(item, start_m, speeds)
-    limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
+    limits = speeds.limits(item)
     match item:
         case items.GoToItem():
             return LineProfile(start_m, item.position_ned_m, *limits)
         case items.PathItem():
             return CurveProfile((start_m, *item.points_ned_m), *limits)
+        case items.VelocityItem():
+            # The line that is covered in the time.
+            speed_m_s, braking, speeding_up = limits
+            ahead = unit(item.velocity_ned_m_s)
+            level = math.hypot(*ahead[:2])
+            growth = min(braking, speeding_up / level) if level > 0.0 else braking
+            # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
+            ramps_s2_per_m = 0.5 / growth + 0.5 / braking
+            top = min(speed_m_s, 0.5 * item.duration_s / ramps_s2_per_m)
+            length = top * (item.duration_s - top * ramps_s2_per_m)
+            return LineProfile(start_m, plus(start_m, length, ahead), top, braking, speeding_up)
         case items.OrbitItem():
-            return _round(item, start_m, limits)
-
-
-def _with_velocity(item: items.VelocityItem, start_m: Vector3, speeds: SpeedLimits) -> LineProfile:
-    """The line that is covered in the time, ramps included."""
-    speed = math.hypot(*item.velocity_ned_m_s)
-    _, braking, speeding_up = speeds.limits(None, item.acceleration_m_s2)
-    n, e, d = (component / speed for component in item.velocity_ned_m_s)
-    growth = min(braking, speeding_up / math.hypot(n, e)) if (n, e) != (0.0, 0.0) else braking
-    # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
-    ramps_s2_per_m = 0.5 / growth + 0.5 / braking
-    top = min(speeds.slowed_m_s(speed), 0.5 * item.duration_s / ramps_s2_per_m)
-    length = top * (item.duration_s - top * ramps_s2_per_m)
-    target = (start_m[0] + n * length, start_m[1] + e * length, start_m[2] + d * length)
-    return LineProfile(start_m, target, top, braking, speeding_up)
-
-
-def _round(item: items.OrbitItem, start_m: Vector3, limits: SpeedAndAccelerations) -> Chain:
-    """To the nearest point of the circle, which for a start in its middle is the one in the north, and round."""
-    n, e, _ = item.centre_ned_m
-    start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
-    angle_rad = math.tau * item.turns * (1.0 if item.clockwise else -1.0)
-    circle = CircleProfile(item.centre_ned_m, item.radius_m, start_rad, angle_rad, *limits)
-    return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
+            # To the nearest point of the circle, which for a start in its middle is the one in the north, and round.
+            n, e, _ = item.centre_ned_m
+            start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
+            angle_rad = math.tau * item.turns * (1.0 if item.clockwise else -1.0)
+            circle = CircleProfile(item.centre_ned_m, item.radius_m, start_rad, angle_rad, *limits)
+            return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
 
 
 # A curve is looked at in steps of half a guard; a longer one in so many.
@@ -141,64 +124,67 @@ class Planned:
 
 def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """The item's own trajectory where that is free. A velocity item is flown as it is: it has no goal."""
-    own = trajectory_of(item, start_m, speeds)
+    own, limits = trajectory_of(item, start_m, speeds), speeds.limits(item)
     if isinstance(item, items.VelocityItem) or not _is_blocked(own, known):
         return Planned(own)
-    if isinstance(item, items.OrbitItem) and item.turns > 1.0:
-        return _turn_by_turn(item, start_m, speeds, known)
-    points = _round_by_points(item, own) if isinstance(item, items.OrbitItem) else _points_of(item)
+    is_round, points = isinstance(item, items.OrbitItem), list[Vector3]()
+    match item, own:
+        case items.OrbitItem(turns=turns), Chain(parts=[_, circle]):
+            if turns > 1.0:
+                return _turn_by_turn(item, start_m, speeds, known)
+            count = math.ceil(360.0 * turns / ROUND_BY_DEG)
+            # Evenly in time is nearly evenly round, as a circle's ramps are short.
+            points = [circle.at(circle.duration_s * number / count)[0] for number in range(count + 1)]
+        case items.PathItem(points_ned_m=given), _:
+            points = list(given)
+        case items.GoToItem(position_ned_m=goal), _:
+            points = [goal]
     places, left_out = [start_m], 0
     for point in points:
-        is_welcome = not isinstance(item, items.OrbitItem) or known.is_clear(point, start_m)
-        found = route(known, places[-1], point) if is_welcome else None
+        found = route(known, places[-1], point) if not is_round or known.is_clear(point, start_m) else None
         left_out += found is None
         places += found or ()
     # Of a circle any part is worth flying; a line or a path has somewhere to be.
-    if len(places) == 1 or (not isinstance(item, items.OrbitItem) and places[-1] != points[-1]):
+    if len(places) == 1 or (not is_round and places[-1] != points[-1]):
         return Planned(None)
-    limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
     if not isinstance(item, items.GoToItem):
         curve = CurveProfile(places, *limits)
         places_on_it = looks(curve)
         if not known.block(places_on_it) and all(known.fence.complaint(place) is None for place in places_on_it):
             return Planned(curve, True, left_out)
-    return Planned(lines(places, limits), True, left_out)
+    return Planned(_lines(places, limits), True, left_out)
 
 
 def _turn_by_turn(item: items.OrbitItem, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """At rest after each turn. Turns from one place are planned once: while one is planned, no setpoint is sent."""
-    planned, left_out, place = dict[tuple[float, ...], Planned](), 0, start_m
-    flown: list[Trajectory] = []
+    planned, turns, place = dict[tuple[float, ...], Planned](), list[Planned](), start_m
     for number in range(math.ceil(item.turns)):
         turn = item.model_copy(update={"turns": min(1.0, item.turns - number)})
         key = (turn.turns, *[round(axis_m / LEAST_GAP_M) for axis_m in place])
         if key not in planned:
             planned[key] = trajectory_around(turn, place, speeds, known)
-        left_out += planned[key].left_out
-        trajectory = planned[key].trajectory
-        if trajectory is not None:
-            flown.append(trajectory)
-            place = trajectory.target_m
-    return Planned(Chain(flown), True, left_out) if flown else Planned(None)
+        turns.append(planned[key])
+        place = place if turns[-1].trajectory is None else turns[-1].trajectory.target_m
+    flown = [turn.trajectory for turn in turns if turn.trajectory is not None]
+    return Planned(Chain(flown) if flown else None, True, sum(turn.left_out for turn in turns))
 
 
 def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """Up first where that is asked for, then straight to above the arming position, never above the fence; round known
     obstacles, also above the vehicle.
     """
-    limits = speeds.limits(item.speed_m_s, None)
     wanted_m = max(-start_m[2], item.height_m or 0.0)
     down_m = -min(max(wanted_m, known.fence.min_height_m), known.fence.max_height_m)
-    up, home = (start_m[0], start_m[1], down_m), (0.0, 0.0, down_m)
-    own = lines((start_m, up, home), limits)
+    up, home, limits = (start_m[0], start_m[1], down_m), (0.0, 0.0, down_m), speeds.limits(item)
+    own = _lines((start_m, up, home), limits)
     if not _is_blocked(own, known):
         return Planned(own)
     places = [start_m] if known.block((start_m, up)) else [start_m, up]
     found = route(known, places[-1], home)
-    return Planned(None) if found is None else Planned(lines([*places, *found], limits), True)
+    return Planned(None) if found is None else Planned(_lines([*places, *found], limits), True)
 
 
-def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
+def _lines(places_m: Sequence[Vector3], limits: tuple[float, float, float]) -> Chain:
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
@@ -219,42 +205,20 @@ def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> ite
 
 
 def looks(trajectory: Trajectory) -> list[Vector3]:
-    """Points of a trajectory, near to one another."""
+    """Points of a trajectory, near to one another; of a circle once round."""
+    if isinstance(trajectory, CircleProfile):
+        trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
     count = max(1, min(MOST_LOOKS, math.ceil(trajectory.distance_m / LOOK_EVERY_M)))
     return [trajectory.at(trajectory.duration_s * number / count)[0] for number in range(count + 1)]
 
 
 def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
+    """By what is known, or by the edge of a polygon in which it begins. What has come out of it flies in."""
     if isinstance(trajectory, Chain):
         return any(_is_blocked(part, known) for part in trajectory.parts)
-    if known.keeps_in and _leaves(trajectory, known.fence):
-        return True
-    if not known.patches:
+    if not known.patches and not known.keeps_in:
         return False
-    if isinstance(trajectory, LineProfile):
-        return known.block((trajectory.start_m, trajectory.target_m))
-    if isinstance(trajectory, CircleProfile):
-        trajectory = replace(trajectory, angle_rad=max(-math.tau, min(math.tau, trajectory.angle_rad)))
-    return known.block(looks(trajectory))
-
-
-def _leaves(trajectory: Trajectory, fence: Fence) -> bool:
-    """Whether it leaves a polygon in which it begins. What has come out of it flies in."""
-    if fence.polygon_ne_m is None or fence.outside_by_m(trajectory.at(0.0)[0]) > 0.0:
-        return False
-    if isinstance(trajectory, LineProfile):
-        end = trajectory.target_m[:2]
-        return math.dist(fence.shortened(trajectory.start_m[:2], end), end) > ROUNDING_M
-    return any(fence.outside_by_m(place) > ROUNDING_M for place in looks(trajectory))
-
-
-def _points_of(item: items.GoToItem | items.PathItem) -> Sequence[Vector3]:
-    return item.points_ned_m if isinstance(item, items.PathItem) else (item.position_ned_m,)
-
-
-def _round_by_points(item: items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:
-    assert isinstance(own, Chain), "to the circle and round it"
-    circle = own.parts[1]
-    count = math.ceil(360.0 * item.turns / ROUND_BY_DEG)
-    # Evenly in time is nearly evenly round, as a circle's ramps are short.
-    return [circle.at(circle.duration_s * number / count)[0] for number in range(count + 1)]
+    places, fence = looks(trajectory), known.fence
+    begins_inside = known.keeps_in and fence.polygon_ne_m is not None and fence.outside_by_m(places[0]) == 0.0
+    leaves = begins_inside and any(fence.outside_by_m(place) > ROUNDING_M for place in places)
+    return leaves or known.block(places)

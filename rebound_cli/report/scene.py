@@ -81,10 +81,9 @@ def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
         outline = assumed_area(patch, 0.0).exterior.coords[:-1]
         corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline]
     else:
-        (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
         (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()
         around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
-        corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
+        corners = [(*patch.place_ne_m(along_m), -height_m) for along_m, height_m in around]
     return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
 
 

@@ -181,18 +181,6 @@ def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there_and_no_g
     assert route(known, START, (4.0 - REACH_M - LEAST_FREE_M - 0.05, 0.0, -1.5)) is not None
 
 
-def test_where_the_fence_is_high_enough_the_way_leads_over_it():
-    room = Fence(polygon_ne_m=((-2, -2), (8, -2), (8, 2), (-2, 2)), max_height_m=6)
-    known = around(wall(-1.0, 0.0, 1.0), fence=room)
-    places = route(known, START, GOAL)
-    over_m = -places[0][2]
-    assert over_m == pytest.approx(known.patches[0].assumed_heights_m()[1] + CLEARANCE_M)
-    assert places[0][:2] == START[:2] and places[-2][:2] == GOAL[:2] and places[-1] == GOAL
-    # and not through a ceiling above the start
-    ceiling = Patch(((0.0, 0.0, -2.2),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
-    assert route(around(wall(-1.0, 0.0, 1.0), ceiling, fence=room), START, GOAL) is None
-
-
 # --- items
 
 

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
 
 from companion.mission.item_trajectory import SpeedLimits, trajectory_of
-from companion.mission.items import VelocityItem
+from companion.mission.items import GoToItem, VelocityItem
 from companion.mission.model import Mission, itinerary, steps_to_fly
 from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile
 
@@ -158,7 +158,8 @@ def test_the_velocity_grows_and_turns_slower_than_it_falls(trajectory):
 
 @pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])
 def test_another_try_is_slower_but_not_so_slow_that_nobody_notices_the_touch(speed_m_s, tried_m_s):
-    assert SpeedLimits(speed_m_s, 2.0, factor=0.25).limits(None, None)[0] == pytest.approx(tried_m_s)
+    go_to = GoToItem(position_ned_m=(1.0, 0.0, -1.0))
+    assert SpeedLimits(speed_m_s, 2.0, factor=0.25).limits(go_to)[0] == pytest.approx(tried_m_s)
     velocity = VelocityItem(velocity_ned_m_s=(speed_m_s, 0.0, 0.0), duration_s=20.0)
     trajectory = trajectory_of(velocity, (0.0, 0.0, -2.0), SpeedLimits(1.0, 2.0, factor=0.25))
     assert trajectory.at(10.0)[1][0] == pytest.approx(tried_m_s)
