@@ -1,9 +1,15 @@
-"""The obstacle map for one vehicle: shapes in plan, obstacles at a height, and how near the vehicle may come."""
+"""The obstacle map for one vehicle: shapes in plan, obstacles at a height, how near the vehicle may come, ways round.
 
+Ways are those of a visibility graph (Lozano-Perez and Wesley, 1979) in plan, the height changing evenly. Shapes and
+their distances are shapely's. Mission coordinates, metres.
+"""
+
+import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 
 import numpy as np
 import shapely
@@ -137,3 +143,56 @@ def assumed_area(patch: Patch, error_rad: float) -> BaseGeometry:
     low_m, high_m = min(low_m, high_m - THICKNESS_M), max(high_m, low_m + THICKNESS_M)
     corners = ((low_m, back_m), (low_m, front_m), (high_m, front_m), (high_m, back_m))
     return Polygon([patch.place_ne_m(along_m, off_m) for along_m, off_m in corners])
+
+
+# For ways along an edge of a polygon; less than what the safety envelope takes for rounding.
+FENCE_SLACK_M = 5e-6
+START, GOAL = 0, 1
+
+
+def route(known: ObstacleMap, start_ned_m: Vector3, goal_ned_m: Vector3) -> tuple[Vector3, ...] | None:
+    """The places to fly to, one after the other, the goal last; None when there is no way that is known to be free."""
+    way = _search(known.between((start_ned_m, goal_ned_m), start_ned_m), start_ned_m[:2], goal_ned_m[:2])
+    if way is None:
+        return None
+    lengths = list(accumulate(map(math.dist, way, way[1:]), initial=0.0))
+    down_m, falls_m, total = start_ned_m[2], goal_ned_m[2] - start_ned_m[2], lengths[-1] or 1.0
+    sloped = [(n, e, down_m + falls_m * length / total) for (n, e), length in zip(way, lengths, strict=True)]
+    return (*sloped[1:-1], goal_ned_m)
+
+
+def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None:
+    """The shortest way over the corners of what is known and of the fence (A*), from the start to the goal."""
+    fence, inner = known.fence, known.grown(known.clearance_m - ROUNDING_M)
+    if known.holds(goal) or fence.outside_by_m((*goal, 0.0)) > ROUNDING_M:
+        return None
+    # Between two places in a circle the way is inside too.
+    polygon = Polygon(fence.polygon_ne_m).buffer(FENCE_SLACK_M, join_style="mitre")
+    shapely.prepare([polygon, inner])
+    around = map(tuple, shapely.get_coordinates(known.grown(known.clearance_m)).tolist())
+    corners = filter(lambda corner: fence.contains(*corner), dict.fromkeys([*around, *(fence.polygon_ne_m or ())]))
+    places: list[Place] = [start, goal, *(corner for corner in corners if not inner.intersects(Point(corner)))]
+
+    def is_free(here: int, there: int) -> bool:
+        line = LineString([places[here], places[there]])
+        if fence.polygon_ne_m is not None and not polygon.covers(line):
+            return False
+        # From the start and to the goal as near as those themselves are.
+        ends = [places[end] for end in (here, there) if end in (START, GOAL)]
+        return known.keeps_off(line, ends) if ends else not inner.intersects(line)
+
+    # Of each way that is looked at: how long it is to the goal at least, its length so far, and its places.
+    queue, done = [(math.dist(start, goal), 0.0, [START])], set[int]()
+    while queue:
+        _, length_m, way = heapq.heappop(queue)
+        here = way[-1]
+        if here == GOAL:
+            return [places[number] for number in way]
+        if here in done:
+            continue
+        done.add(here)
+        for there, place in enumerate(places):
+            if there not in done and is_free(here, there):
+                longer_m = length_m + math.dist(places[here], place)
+                heapq.heappush(queue, (longer_m + math.dist(place, goal), longer_m, [*way, there]))
+    return None

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from companion.memory.route import route
-from companion.memory.surroundings import ROUNDING_M, ObstacleMap
+from companion.memory.surroundings import ROUNDING_M, ObstacleMap, route
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig

@@ -12,9 +12,8 @@ from shapely import LineString, Point
 
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, is_same, touch_of
-from companion.memory.route import route
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, route
 from companion.mission.item_trajectory import SpeedLimits, home_around, left_of, looks, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem
 from companion.mission.trajectory import CurveProfile
