@@ -178,7 +178,7 @@ class FlightContext:
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
         self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
         self.steps = steps_to_fly(self.mission)
-        self.known = self.mission.known(self.mission.obstacles.patches())
+        self.known = self.mission.known
 
     @property
     def step(self) -> Step:

@@ -92,4 +92,4 @@ def _with_hits(flight: FlightContext, hits: int) -> ObstacleMap:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
         touch = touch_of(centre, velocity, record.normal, flight.known.reach_m, record.detected_at_us)
         touches += [] if touch is None else [touch]
-    return mission.known(mission.obstacles.patches()).joined(touches)
+    return mission.known.joined(touches)

@@ -122,7 +122,7 @@ def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]
         f"then {_after_recovery(on_hit)}",
         *([] if mission.on_damage == "tell" else [f"{_DAMAGED}: {_AFTER[mission.on_damage]}"]),
         f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {_AFTER[obstacles.on_unreachable]}",
-        *[f"Known      {describe_patch(patch)}" for patch in obstacles.patches()],
+        *[f"Known      {describe_patch(patch)}" for patch in obstacles.known],
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
         f"Unattended {unattended_text(autopilot, _fastest_m_s(mission))}",

@@ -8,7 +8,7 @@ from companion.autopilot.known import GUARDED_MODES, MODE_NAMES, NAMES
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.mission.policy import OnCrash, SetpointLimits
+from companion.mission.policy import SetpointLimits
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import Positive, StrictModel
 
@@ -22,7 +22,7 @@ class GuardConfig(StrictModel):
     """Modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
     """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
-    on_crash: OnCrash = "tell"
+    on_crash: Literal["tell", "disarm"] = "tell"
     """When the vehicle lies on the ground after a crash: whose vehicle it is decides. Never in the air."""
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. Three hits in one

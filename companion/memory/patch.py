@@ -5,14 +5,16 @@ Mission coordinates, metres.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator, Field
 
 from companion.messages import Vector3
 from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import PLACE_SPREAD_M
 from companion.reflex.surface import Normal, away_from, is_from_behind
+from companion.strict_model import NotNegative, PositionNed, StrictModel
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
 # touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.
@@ -24,19 +26,29 @@ GOES_ON = 0.5
 GOES_ON_MOST_M = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Patch:
-    """One surface: all touches of it, the unit normal that they agree on and its standard deviation.
+def _outwards(normal_ned: Vector3) -> Vector3:
+    if not any(normal_ned):
+        raise ValueError("has no direction; it points out of the surface, such as [-1, 0, 0]")
+    return away_from(normal_ned)
 
-    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `reaches_m`: the least that
-    it is assumed to extend beyond its touches. `found_at_us`: time of the first touch.
-    """
 
-    touches_ned_m: tuple[Vector3, ...]
-    normal_ned: Vector3
-    normal_error_rad: float
-    reaches_m: float
-    found_at_us: int
+class Patch(StrictModel):
+    """A surface: where it was touched, and the direction out of it. NED from the arming position, metres."""
+
+    touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
+    """Places on the surface; of a wall two near its ends."""
+    normal_ned: Annotated[PositionNed, AfterValidator(_outwards)]
+    """Of any length; a wall's counts as horizontal, see surface.away_from."""
+    normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
+    """One standard deviation; the normal of one whole contact."""
+    reaches_m: NotNegative = REACHES_M
+    """The least that it is assumed to extend beyond its touches."""
+    found_at_us: Annotated[int, Field(strict=True, ge=0)] = 0
+    """When it was first touched, by the clock of the flight that did."""
+
+    @property
+    def normal_error_rad(self) -> float:
+        return math.radians(self.normal_error_deg)
 
     @property
     def hits(self) -> int:
@@ -44,6 +56,7 @@ class Patch:
 
     @property
     def is_steep(self) -> bool:
+        """Whether it is no wall but a ceiling, a floor or a roof."""
         return self.normal_ned[2] != 0.0
 
     @property
@@ -86,10 +99,9 @@ class Patch:
     def assumed_heights_m(self) -> tuple[float, float]:
         """Lowest and highest height of its assumed extent; unbounded above a ceiling and below a floor."""
         heights_m = [-place[2] for place in self.touches_ned_m]
-        low, high = min(heights_m), max(heights_m)
         if not self.is_steep:
-            return self._grown(low, high)
-        return (low, math.inf) if self.normal_ned[2] > 0.0 else (-math.inf, high)
+            return self._grown(min(heights_m), max(heights_m))
+        return (min(heights_m), math.inf) if self.normal_ned[2] > 0.0 else (-math.inf, max(heights_m))
 
     def faces(self, place_ned_m: Vector3, beside_m: float) -> bool:
         """Whether a place is in front of the assumed extent, or at most `beside_m` beside it."""
@@ -139,7 +151,14 @@ def touch_of(
     is_behind = is_from_behind(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s)))
     surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
-    return Patch((surface_ned_m,), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
+    # Not validated: an estimate that has run away must not stop the flight here.
+    return Patch.model_construct(
+        touches_ned_m=(surface_ned_m,),
+        normal_ned=normal.direction_ned,
+        normal_error_deg=math.degrees(normal.error_rad),
+        reaches_m=reaches_m,
+        found_at_us=found_at_us,
+    )
 
 
 # Normals this near to each other may be one surface's however sure each is of itself: a wall is not quite plane.
@@ -168,11 +187,11 @@ def joined(patches: Sequence[Patch], touch: Patch) -> Patch:
     parts, normal = [*patches, touch], ZERO
     for part in parts:
         normal = plus(normal, part.hits / max(part.normal_error_rad, 1e-3) ** 2, part.normal_ned)
-    patch = Patch(
+    patch = Patch.model_construct(
         touches_ned_m=tuple(place for part in parts for place in part.touches_ned_m),
         normal_ned=unit(normal),
         # Normals of one surface have errors in common (friction leans all alike): the mean is no better than the best.
-        normal_error_rad=min(part.normal_error_rad for part in parts),
+        normal_error_deg=min(part.normal_error_deg for part in parts),
         reaches_m=max(part.reaches_m for part in parts),
         found_at_us=min(part.found_at_us for part in parts),
     )
@@ -188,8 +207,9 @@ def _turned_to_places(patch: Patch) -> Patch:
     (nn, ne), (_, ee) = np.cov(np.transpose(patch.touches_ned_m)[:2]).tolist()
     along_rad = 0.5 * math.atan2(2.0 * ne, nn - ee)
     normal = (-math.sin(along_rad), math.cos(along_rad), 0.0)
-    is_back = along(normal, patch.normal_ned) < 0.0
-    return replace(patch, normal_ned=minus(ZERO, normal) if is_back else normal, normal_error_rad=error_rad)
+    if along(normal, patch.normal_ned) < 0.0:
+        normal = minus(ZERO, normal)
+    return patch.model_copy(update={"normal_ned": normal, "normal_error_deg": math.degrees(error_rad)})
 
 
 def _outside_m(value: float, bounds: tuple[float, float]) -> float:

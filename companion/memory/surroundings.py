@@ -36,14 +36,14 @@ LEAST_FREE_M = 0.15
 class ObstacleMap:
     """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces.
 
-    `keeps_in`: a way that leaves the fence is blocked, too; where a mission is planned it is refused.
+    `keeps_in`: a way that leaves the fence is blocked, too; a mission that is written so is refused.
     """
 
     patches: tuple[Patch, ...]
     fence: Fence
     reach_m: float
     margin_m: float
-    keeps_in: bool = False
+    keeps_in: bool = True
 
     @property
     def clearance_m(self) -> float:

@@ -198,7 +198,7 @@ def left_of(item: items.Motion, trajectory: Trajectory, elapsed_s: float) -> ite
         case items.OrbitItem(), Chain(parts=[_, CircleProfile(duration_s=round_s)]):
             return item.model_copy(update={"turns": item.turns * min(1.0, left_s / round_s)})
         case items.PathItem(points_ned_m=points), Chain() | CurveProfile():
-            ahead = [place for place in trajectory.ahead(elapsed_s) if place in points]
+            ahead = [place for at_s, place in trajectory.passes if at_s > elapsed_s and place in points]
             return item.model_copy(update={"points_ned_m": tuple(ahead) or points[-1:]})
     return item
 

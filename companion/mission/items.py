@@ -6,12 +6,13 @@ Coordinates: NED, relative to the arming position.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, model_validator
 
 from companion.autopilot.known import defaults
-from companion.mission.policy import OnCollision, OnTimeout
+from companion.mission.policy import OnCollision
 from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
 Count = Annotated[int, Field(strict=True, ge=0)]
@@ -328,7 +329,7 @@ class MissionItem(StrictModel):
     """What follows a hit in this item; without one the mission's policy."""
     timeout_s: Positive | None = None
     """How long the item may take, recoveries included."""
-    on_timeout: OnTimeout = "abort"
+    on_timeout: Literal["abort", "continue", "return", "land"] = "abort"
     """What follows then; abort hands the vehicle over as on_interrupt says."""
 
     @model_validator(mode="after")
@@ -383,12 +384,10 @@ class Step:
 
 def program(items: tuple[MissionItem, ...]) -> tuple[Step, ...]:
     """All steps in the order in which they are flown. Raises ValueError when they are too many."""
-    steps: list[Step] = []
-    for label, item in _labelled(items, "", ""):
-        steps.append(Step(len(steps), label, item, item.action))
-        if len(steps) > MOST_STEPS:
-            raise ValueError(f"items: more than {MOST_STEPS} steps once the repeats are written out")
-    return tuple(steps)
+    labelled = list(islice(_labelled(items, "", ""), MOST_STEPS + 1))
+    if len(labelled) > MOST_STEPS:
+        raise ValueError(f"items: more than {MOST_STEPS} steps once the repeats are written out")
+    return tuple(Step(index, label, item, item.action) for index, (label, item) in enumerate(labelled))
 
 
 def _labelled(items: tuple[MissionItem, ...], before: str, lap: str) -> Iterator[tuple[str, MissionItem]]:

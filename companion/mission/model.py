@@ -6,13 +6,12 @@ Coordinates: NED, relative to the arming position, aligned north.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from companion.autopilot.known import defaults
 from companion.fence import Fence
-from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
@@ -20,7 +19,7 @@ from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, looks, stay, trajectory_around
 from companion.mission.items import MissionItem
-from companion.mission.policy import AbortWhen, Handover, OnCollision, OnCrash, OnDamage, Resume, SetpointLimits
+from companion.mission.policy import AbortWhen, OnCollision, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import StrictModel
@@ -42,57 +41,55 @@ class Mission(StrictModel):
     recovery: RecoveryConfig = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
-    on_damage: OnDamage = "tell"
+    on_damage: Literal["tell", "land", "return"] = "tell"
     """After a hit that has hurt a propeller or a motor; told in any case. From the recovery's end on."""
-    on_crash: OnCrash = "disarm"
+    on_crash: Literal["tell", "disarm"] = "disarm"
     """When the vehicle lies on the ground after a crash, which is reported in any case. Never in the air."""
-    on_interrupt: Handover = "hold"
+    on_interrupt: Literal["hold", "land"] = "hold"
     """What the vehicle is told to do when the flight ends early."""
     companion: CompanionConfig = CompanionConfig()
     resume: Resume | None = None
     sim: dict[str, object] | None = None
     """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
-    def known(self, patches: tuple[Patch, ...], keeps_in: bool = True) -> ObstacleMap:
-        return ObstacleMap(patches, self.fence, self.companion.estimate.reach_m, self.obstacles.margin_m, keeps_in)
+    @property
+    def known(self) -> ObstacleMap:
+        """What is known of the surroundings beforehand."""
+        reach_m, margin_m = self.companion.estimate.reach_m, self.obstacles.margin_m
+        return ObstacleMap(self.obstacles.known, self.fence, reach_m, margin_m)
 
     @model_validator(mode="after")
-    def _takeoff_first_land_last(self) -> Self:
-        names = [item.name for item in self.items]
+    def _can_be_flown(self) -> Self:
+        names, seen = [item.name for item in self.items], set[tuple[int, Vector3]]()
         if names[0] != "takeoff":
             raise ValueError(f"items: the first item must be takeoff, not {names[0]}")
         if names[-1] not in ("land", "return"):
             raise ValueError(f"items: the last item must be land or return, not {names[-1]}")
-        for step in items.program(self.items):
-            number = step.label.partition(" ")[0]
-            if step.name in ("takeoff", "land", "return") and number not in ("1", f"{len(names)}"):
-                where = "first" if step.name == "takeoff" else "last"
-                raise ValueError(f"items: item {number} is {step.name}, which may only come {where}")
-            speed_m_s = items.speed_m_s(step.action) or 0.0
-            limit_m_s = self.limits.max_speed_m_s
-            if speed_m_s > limit_m_s:
-                flies = f"item {number} ({step.name}) flies at {speed_m_s:g} m/s"
-                raise ValueError(f"items: {flies}, above limits.max_speed_m_s = {limit_m_s:g}")
+        for leg in _legs(self):
+            # A repeat's laps mostly go the same ways.
+            complaint = None if (id(leg.step.action), leg.start_ned_m) in seen else self._complaint(leg)
+            if complaint is not None:
+                raise ValueError(f"items: {complaint}")
+            seen.add((id(leg.step.action), leg.start_ned_m))
+        steps_to_fly(self)  # raises ValueError, too
         return self
 
-    @model_validator(mode="after")
-    def _trajectories_inside_fence(self) -> Self:
-        steps_to_fly(self)  # raises ValueError, too
-        seen: set[tuple[int, Vector3]] = set()
-        for leg in _legs(self):
-            # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
-            if leg.trajectory is None or (id(leg.step.action), leg.start_ned_m) in seen:
-                continue
-            seen.add((id(leg.step.action), leg.start_ned_m))
-            number = leg.step.label.partition(" ")[0]
-            complaint = self.fence.complaint(leg.end_ned_m)
-            if complaint is not None:
-                raise ValueError(f"items: the position of item {number} ({leg.step.name}) {complaint}")
-            if not isinstance(leg.step.action, items.TakeoffItem):
-                complaint = _trajectory_complaint(self.fence, leg.trajectory)
-            if complaint is not None:
-                raise ValueError(f"items: on its way item {number} ({leg.step.name}) {complaint}")
-        return self
+    def _complaint(self, leg: "Leg") -> str | None:
+        """What is wrong with a step as it is written, or None."""
+        name, number, limit_m_s = leg.step.name, leg.step.label.partition(" ")[0], self.limits.max_speed_m_s
+        if name in ("takeoff", "land", "return") and number not in ("1", f"{len(self.items)}"):
+            return f"item {number} is {name}, which may only come {'first' if name == 'takeoff' else 'last'}"
+        speed_m_s = items.speed_m_s(leg.step.action) or 0.0
+        if speed_m_s > limit_m_s:
+            flies = f"item {number} ({name}) flies at {speed_m_s:g} m/s"
+            return f"{flies}, above limits.max_speed_m_s = {limit_m_s:g}"
+        assert leg.trajectory is not None, "nothing is in its way"
+        complaint = self.fence.complaint(leg.trajectory.target_m)
+        if complaint is not None:
+            return f"the position of item {number} ({name}) {complaint}"
+        # On the way up from the ground only the end can be wrong.
+        complaint = None if name == "takeoff" else _trajectory_complaint(self.fence, leg.trajectory)
+        return None if complaint is None else f"on its way item {number} ({name}) {complaint}"
 
 
 # A point on the boundary, computed, may lie outside by a rounding error.
@@ -115,14 +112,10 @@ class Leg:
     lasts_s: float | None
     is_detour: bool
 
-    @property
-    def end_ned_m(self) -> Vector3:
-        return self.start_ned_m if self.trajectory is None else self.trajectory.target_m
-
 
 def itinerary(mission: Mission) -> tuple[Leg, ...]:
     """The mission when nothing is hit, round what is known beforehand."""
-    return tuple(_legs(mission, mission.obstacles.patches()))
+    return tuple(_legs(mission, mission.known))
 
 
 def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
@@ -144,18 +137,18 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     return (steps[0], *set_speeds, back, *steps[at:])
 
 
-def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
+def _legs(mission: Mission, known: ObstacleMap | None = None) -> Iterator[Leg]:
+    """The steps round what is known, or without that as they are written."""
     place: Vector3 = (0.0, 0.0, 0.0)
-    known = mission.known(patches, keeps_in=False)
-    flight = mission.companion.flight
-    speeds = SpeedLimits.of(flight, mission.limits.max_speed_m_s)
+    known = known or replace(mission.known, patches=(), keeps_in=False)
+    flight, most_m_s = mission.companion.flight, mission.limits.max_speed_m_s
+    speeds = SpeedLimits.of(flight, most_m_s)
     for step in items.program(mission.items):
-        action = step.action
+        action, planned = step.action, Planned(stay(place))
         lasts_s: float | None = 0.0
-        planned = Planned(stay(place))
         match action:
             case items.TakeoffItem():
-                planned = Planned(climb(place, action.height_m, flight, mission.limits.max_speed_m_s))
+                planned = Planned(climb(place, action.height_m, flight, most_m_s))
             case items.HoldItem():
                 lasts_s = action.duration_s
             case items.WaitForItem():
@@ -167,23 +160,17 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 lasts_s = 180.0 / action.rate_deg_s
             case items.ReturnItem():
                 planned = home_around(place, action, speeds, known)
-                lasts_s = _landing_s(place if planned.trajectory is None else planned.trajectory.target_m)
-            case items.LandItem():
-                lasts_s = _landing_s(place)
             case items.GoToItem() | items.VelocityItem() | items.PathItem() | items.OrbitItem():
                 planned = trajectory_around(action, place, speeds, known)
                 if isinstance(action.yaw_deg, float | int) and planned.trajectory is not None:
                     # It turns on its way, and after it.
                     lasts_s = max(0.0, 180.0 / defaults.TURNING_DEG_S - planned.trajectory.duration_s)
-        if lasts_s is not None and planned.trajectory is not None:
-            lasts_s += planned.trajectory.duration_s
-        leg = Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)
-        yield leg
-        place = leg.end_ned_m
-
-
-def _landing_s(place: Vector3) -> float:
-    return -place[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
+        begins, flown = place, planned.trajectory or stay(place)
+        place = flown.target_m
+        if isinstance(action, items.ReturnItem | items.LandItem):
+            lasts_s = -place[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
+        lasts_s = None if lasts_s is None else lasts_s + flown.duration_s
+        yield Leg(step, begins, planned.trajectory, lasts_s, planned.is_detour)
 
 
 def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:

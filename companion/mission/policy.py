@@ -1,15 +1,10 @@
 """What follows a hit, a time-out and an interruption."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
-
-Handover: TypeAlias = Literal["hold", "land"]
-OnDamage: TypeAlias = Literal["tell", "land", "return"]
-OnCrash: TypeAlias = Literal["tell", "disarm"]
-OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 
 
 class OnCollision(StrictModel):

@@ -122,8 +122,11 @@ class Chain:
 
     def __post_init__(self) -> None:
         self.distance_m: float = sum(part.distance_m for part in self.parts)
-        self.duration_s: float = sum(part.duration_s for part in self.parts)
-        self.target_m: Vector3 = self.parts[-1].target_m
+        ends_s = accumulate(part.duration_s for part in self.parts)
+        # The end of each part, and when it is reached.
+        self.passes = [(end_s, part.target_m) for end_s, part in zip(ends_s, self.parts, strict=True)]
+        self.duration_s: float = self.passes[-1][0]
+        self.target_m: Vector3 = self.passes[-1][1]
 
     def at(self, elapsed_s: float) -> Motion:
         for part in self.parts[:-1]:
@@ -131,11 +134,6 @@ class Chain:
                 return part.at(elapsed_s)
             elapsed_s -= part.duration_s
         return self.parts[-1].at(elapsed_s)
-
-    def ahead(self, elapsed_s: float) -> list[Vector3]:
-        """The ends of its parts that are not reached by then."""
-        ends_s = accumulate(part.duration_s for part in self.parts)
-        return [part.target_m for part, end_s in zip(self.parts, ends_s, strict=True) if end_s > elapsed_s]
 
 
 Floats = npt.NDArray[np.float64]
@@ -166,14 +164,16 @@ class CurveProfile:
     speeding_up_m_s2: float = math.inf
 
     def __post_init__(self) -> None:
-        self._kept_m: list[Vector3] = []
+        points: list[Vector3] = []
         for point in self.points_m:
-            if not self._kept_m or math.dist(point, self._kept_m[-1]) >= LEAST_GAP_M:
-                self._kept_m.append(point)
-        self.target_m = self._kept_m[-1]
-        self.distance_m, self.duration_s, self._passed_s = 0.0, 0.0, [0.0]
-        if len(self._kept_m) > 1:
-            self._plan(np.array(self._kept_m))
+            if not points or math.dist(point, points[-1]) >= LEAST_GAP_M:
+                points.append(point)
+        self.target_m = points[-1]
+        self.distance_m = self.duration_s = 0.0
+        # Each point, and when it is passed.
+        self.passes = [(0.0, self.target_m)]
+        if len(points) > 1:
+            self._plan(points)
 
     def at(self, elapsed_s: float) -> Motion:
         if elapsed_s >= self.duration_s:
@@ -184,11 +184,8 @@ class CurveProfile:
         place, velocity, acceleration = map(tuple, (before + (steps - index) * (after - before)).tolist())
         return place, velocity, acceleration
 
-    def ahead(self, elapsed_s: float) -> list[Vector3]:
-        """The points that are not passed by then."""
-        return [place for place, passed_s in zip(self._kept_m, self._passed_s, strict=True) if passed_s > elapsed_s]
-
-    def _plan(self, points: Floats) -> None:
+    def _plan(self, points_m: list[Vector3]) -> None:
+        points = np.array(points_m)
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])
         spline = _Spline(knots, points)
@@ -201,7 +198,7 @@ class CurveProfile:
         speeds = self._speeds(first / rate[:, None], pieces_m)
         times_s = np.concatenate([[0.0], np.cumsum(2.0 * pieces_m / (speeds[1:] + speeds[:-1]))])
         self.distance_m, self.duration_s = float(along_m[-1]), float(times_s[-1])
-        self._passed_s = np.interp(knots, u, times_s).tolist()
+        self.passes = list(zip(np.interp(knots, u, times_s).tolist(), points_m, strict=True))
         self._tabulate(spline, u, along_m, speeds, times_s)
 
     def _speeds(self, tangents: Floats, pieces_m: Floats) -> Floats:

@@ -34,7 +34,7 @@ def planned_flight(mission: Mission, world: SimulatedWorld, legs: Sequence[Flown
     """As if the vehicle booted while it is armed: with that begins what moves in its world."""
     (north_m, east_m, _), standing_m = world.scene.start.position_ned_m, world.airframe.geometry.foot_depth_m
     # Later than all that was known beforehand.
-    started_us = at_us = 1 + max((patch.found_at_us for patch in mission.obstacles.patches()), default=0)
+    started_us = at_us = 1 + max((patch.found_at_us for patch in mission.obstacles.known), default=0)
     events = [_event(at_us, "armed", "", origin_ned_m=(north_m, east_m, -standing_m))]
     samples: list[tuple[int, LocalPosition]] = []
 
@@ -66,7 +66,7 @@ def planned_flight(mission: Mission, world: SimulatedWorld, legs: Sequence[Flown
         scene=world.scene,
         rotors_frd_m=[rotor.place_frd_m for rotor in world.airframe.rotors],
         truth=FlightTruth((), {}, started_us),
-        patches=mission.obstacles.patches(),
+        patches=mission.obstacles.known,
     )
 
 

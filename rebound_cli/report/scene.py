@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 from companion.memory.patch import Patch
-from companion.memory.stored import KnownPatch
 from companion.memory.surroundings import assumed_area
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.run_folder import EVENTS_NAME, reading
@@ -61,7 +60,7 @@ def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
     """What was believed of each surface from when until when: from each touch of it to the next."""
     with reading(EVENTS_NAME):
         told = [
-            (rounded_s(flight, event["time_us"]), KnownPatch.model_validate(event["data"]).patch())
+            (rounded_s(flight, event["time_us"]), Patch.model_validate(event["data"]))
             for event in flight.events
             if event["kind"] == "obstacle"
         ]

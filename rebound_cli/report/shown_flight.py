@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from companion.guard.config import GuardConfig
 from companion.memory.patch import Patch
-from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.inputs.documents import load_document, validated
@@ -171,4 +170,4 @@ def _patches(path: Path) -> Sequence[Patch]:
     if not path.exists():
         return ()
     with run_folder.reading(path):
-        return [KnownPatch.model_validate(data).patch() for data in json.loads(path.read_text())["patches"]]
+        return [Patch.model_validate(data) for data in json.loads(path.read_text())["patches"]]

@@ -70,7 +70,8 @@ def _counts(summary: Mapping[str, Any]) -> list[str]:
 
 def _surroundings(summary: Mapping[str, Any]) -> list[str]:
     """What is known at the end, and what could not be reached for it."""
-    from companion.memory.stored import KnownPatch, describe
+    from companion.memory.patch import Patch
+    from companion.memory.stored import describe
 
-    lines = [f"Remembered: {describe(KnownPatch.model_validate(data).patch())}." for data in summary["obstacles"]]
+    lines = [f"Remembered: {describe(Patch.model_validate(data))}." for data in summary["obstacles"]]
     return lines + [f"Out of reach: {name if name == 'home' else f'item {name}'}." for name in summary["unreachable"]]

@@ -217,7 +217,8 @@ def test_a_way_home_that_is_cut_off_ends_where_it_is():
     f = flight(FakeVehicle(), items=[TAKEOFF, beside, {"return": {}}], fence=ROOM, obstacles={"known": []})
     f.run_to("mission")
     f.run_until(lambda: f.vehicle.position[0] > 1.8)
-    f.companion.core.flight.known = f.companion.core.flight.mission.known(ObstaclesConfig(known=known).patches())
+    flown = f.companion.core.flight
+    flown.known = flown.mission.model_copy(update={"obstacles": ObstaclesConfig(known=known)}).known
     f.run_to_end(60)
     assert f.report.unreachable == ("home",)
     assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.3)

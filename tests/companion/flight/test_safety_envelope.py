@@ -308,7 +308,7 @@ def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remem
         assert sent.velocity_ned_m_s is None or sent.velocity_ned_m_s[0] < 1.9
         assert (wall.patch is None) is (state == "recovering")
     # and a hit that the vehicle is to come to rest behind holds nothing back
-    flown.known, record.is_over = flown.mission.known(()), False
+    flown.known, record.is_over = flown.mission.known, False
     assert len(known_surfaces(flown)) == 1
     record.setpoint_ned_m = (4.0, 0.0, -1.5)
     assert known_surfaces(flown) == []

@@ -1,7 +1,6 @@
 """A flight's room: its fence, the patches that touches leave, and ways round them: the shortest, or none."""
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -12,7 +11,7 @@ from shapely import LineString, Point
 
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, is_same, touch_of
-from companion.memory.stored import KnownPatch, ObstacleFile, as_data
+from companion.memory.stored import ObstacleFile, as_data
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, route
 from companion.mission.item_trajectory import SpeedLimits, home_around, left_of, looks, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem
@@ -68,7 +67,7 @@ ERROR_RAD = math.radians(15.0)
 def wall(*easts_m: float, height_m: float = 1.5, normal=SOUTH, north_m: float = 4.0) -> Patch:
     """A wall as it is remembered, touched at these places."""
     places = tuple((north_m, east_m, -height_m) for east_m in easts_m)
-    return Patch(places, normal, ERROR_RAD, REACHES_M, found_at_us=1)
+    return Patch(touches_ned_m=places, normal_ned=normal, normal_error_deg=15.0, found_at_us=1)
 
 
 def turned(deg: float):
@@ -123,7 +122,7 @@ def test_another_surface_is_another_patch(other):
 
 
 def test_a_ceiling_whose_direction_is_not_known_well_bends_beside_its_touch():
-    ceiling = Patch(((0.0, 0.0, -2.2),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
+    ceiling = Patch(touches_ned_m=((0.0, 0.0, -2.2),), normal_ned=(0.0, 0.0, 1.0))
     beside_m = ceiling.beside_m((3.0, 4.0, -1.0))
     assert beside_m == 5.0
     assert ceiling.bends_m(beside_m) == pytest.approx(5.0 * math.tan(ERROR_RAD))
@@ -135,13 +134,12 @@ def test_a_ceiling_whose_direction_is_not_known_well_bends_beside_its_touch():
 def test_a_patch_comes_back_from_a_file_as_it_was():
     known = around().joined([wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))]).patches
     stored = ObstacleFile.model_validate({"patches": [as_data(patch) for patch in known]})
-    for before, after in zip(known, stored.patches, strict=True):
-        patch = after.patch()
+    for before, patch in zip(known, stored.patches, strict=True):
         assert patch.hits == before.hits and patch.found_at_us == before.found_at_us
         assert patch.normal_ned == pytest.approx(before.normal_ned, abs=1e-3)
         assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
         # and a second time to the last digit
-        assert as_data(KnownPatch.model_validate(as_data(patch)).patch()) == as_data(patch)
+        assert as_data(Patch.model_validate(as_data(patch))) == as_data(patch)
 
 
 REACH_M, MARGIN_M = 0.2, 0.35
@@ -232,7 +230,7 @@ def test_of_a_path_round_a_wall_its_own_points_are_left():
 def test_a_flight_keeps_in_a_polygon_that_bends():
     # Given two arms that are joined in the south, and a way from one into the other
     arms = Fence(polygon_ne_m=[[-8, -2], [6, -2], [6, 2], [-4, 2], [-4, 5], [6, 5], [6, 9], [-8, 9]])
-    start, known = (0.0, 7.0, -1.5), replace(around(fence=arms), keeps_in=True)
+    start, known = (0.0, 7.0, -1.5), around(fence=arms)
     for planned in (
         home_around(start, ReturnItem(), PACE, known),
         trajectory_around(GoToItem(position_ned_m=(2.0, 0.0, -1.5)), start, PACE, known),

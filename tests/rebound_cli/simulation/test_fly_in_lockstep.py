@@ -107,7 +107,7 @@ def test_the_file_in_a_mission_lies_beside_it(tmp_path):
     (tmp_path / "hall.yaml").write_text("patches: [{touches_ned_m: [[4, 0, -1]], normal_ned: [-2, 0, 0]}]")
     mission = tmp_path / "mission.yaml"
     mission.write_text(yaml.safe_dump({**data, "obstacles": {"file": "hall.yaml"}}))
-    (patch,) = mission_from(load_mission_document(mission, ())).obstacles.patches()
+    (patch,) = mission_from(load_mission_document(mission, ())).obstacles.known
     assert patch.normal_ned == (-1.0, 0.0, 0.0)
 
 
