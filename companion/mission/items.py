@@ -285,10 +285,8 @@ def speed_m_s(action: Action) -> float | None:
 # A mission longer than this once its repeats are written out is a slip of the pen.
 MOST_STEPS = 10_000
 
-ACTIONS = (
-    *("takeoff", "go_to", "velocity", "path", "orbit", "hold", "wait_for"),
-    *("set_speed", "set_yaw", "expect", "repeat", "return", "land"),
-)
+# What stands beside an item's action; every other key of an item is an action.
+BESIDE = ("on_collision", "timeout_s", "on_timeout")
 
 
 class RepeatItem(StrictModel):
@@ -300,15 +298,15 @@ class RepeatItem(StrictModel):
     """What is repeated."""
 
 
+def _one_action(schema: dict[str, Any]) -> None:
+    schema["oneOf"] = [{"required": [name]} for name in schema["properties"] if name not in BESIDE]
+    schema["dependentRequired"] = {"on_timeout": ["timeout_s"]}
+
+
 class MissionItem(StrictModel):
     """One step: a map with exactly one action, and beside it what shall be different for this item."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "oneOf": [{"required": [name]} for name in ACTIONS],
-            "dependentRequired": {"on_timeout": ["timeout_s"]},
-        }
-    )
+    model_config = ConfigDict(json_schema_extra=_one_action)
     bare = frozenset({"land", "return"})
 
     takeoff: TakeoffItem | None = None
@@ -335,7 +333,8 @@ class MissionItem(StrictModel):
     @model_validator(mode="after")
     def _exactly_one_action(self) -> Self:
         if len(self._given) != 1:
-            raise ValueError(f"an item is a map with exactly one key of: {', '.join(ACTIONS)}")
+            names = ", ".join(field.removesuffix("_") for field in type(self).model_fields if field not in BESIDE)
+            raise ValueError(f"an item is a map with exactly one key of: {names}")
         if self.on_timeout != "abort" and self.timeout_s is None:
             raise ValueError("on_timeout says what follows a time-out: give timeout_s too")
         if self.name in ("takeoff", "land", "return", "repeat") and self.timeout_s is not None:
@@ -346,8 +345,7 @@ class MissionItem(StrictModel):
 
     @property
     def _given(self) -> dict[str, Any]:
-        given = {field.removesuffix("_"): value for field, value in self if value is not None}
-        return {name: value for name, value in given.items() if name in ACTIONS}
+        return {field.removesuffix("_"): value for field, value in self if value is not None and field not in BESIDE}
 
     @property
     def name(self) -> str:
