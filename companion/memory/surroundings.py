@@ -167,19 +167,24 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
     if known.holds(goal) or fence.outside_by_m((*goal, 0.0)) > ROUNDING_M:
         return None
     # Between two places in a circle the way is inside too.
-    polygon = Polygon(fence.polygon_ne_m).buffer(FENCE_SLACK_M, join_style="mitre")
+    corners_ne_m = fence.polygon_ne_m
+    polygon = None if corners_ne_m is None else Polygon(corners_ne_m).buffer(FENCE_SLACK_M, join_style="mitre")
     shapely.prepare([polygon, inner])
     around = map(tuple, shapely.get_coordinates(known.grown(known.clearance_m)).tolist())
-    corners = filter(lambda corner: fence.contains(*corner), dict.fromkeys([*around, *(fence.polygon_ne_m or ())]))
+    corners = filter(lambda corner: fence.contains(*corner), dict.fromkeys([*around, *(corners_ne_m or ())]))
     places: list[Place] = [start, goal, *(corner for corner in corners if not inner.intersects(Point(corner)))]
 
-    def is_free(here: int, there: int) -> bool:
-        line = LineString([places[here], places[there]])
-        if fence.polygon_ne_m is not None and not polygon.covers(line):
-            return False
+    def free_from(here: int) -> list[int]:
+        """The places, of those not yet done with, to which a straight way is free."""
+        others = [there for there in range(GOAL, len(places)) if there not in done]
+        lines = shapely.linestrings([[places[here], places[there]] for there in others])
+        is_inside = np.full(len(others), True) if polygon is None else shapely.covers(polygon, lines)
+        is_free = is_inside & ~shapely.intersects(inner, lines)
         # From the start and to the goal as near as those themselves are.
-        ends = [places[end] for end in (here, there) if end in (START, GOAL)]
-        return known.keeps_off(line, ends) if ends else not inner.intersects(line)
+        for number in np.flatnonzero(is_inside) if here == START else (0,):
+            ends = [places[end] for end in (here, others[number]) if end in (START, GOAL)]
+            is_free[number] = is_inside[number] and known.keeps_off(lines[number], ends)
+        return [others[number] for number in np.flatnonzero(is_free)]
 
     # Of each way that is looked at: how long it is to the goal at least, its length so far, and its places.
     queue, done = [(math.dist(start, goal), 0.0, [START])], set[int]()
@@ -191,8 +196,7 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
         if here in done:
             continue
         done.add(here)
-        for there, place in enumerate(places):
-            if there not in done and is_free(here, there):
-                longer_m = length_m + math.dist(places[here], place)
-                heapq.heappush(queue, (longer_m + math.dist(place, goal), longer_m, [*way, there]))
+        for there in free_from(here):
+            longer_m = length_m + math.dist(places[here], places[there])
+            heapq.heappush(queue, (longer_m + math.dist(places[there], goal), longer_m, [*way, there]))
     return None
