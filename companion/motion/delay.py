@@ -31,19 +31,12 @@ class Delay:
         self._against -= a * x + b * y + c * z
         self._square += x * x + y * y + z * z
 
-    def delay_s(self, variance_m2_s2: float) -> float:
-        """The delay; `variance_m2_s2` is the steps' variance on an axis at constant acceleration."""
-        weight = self._weight(variance_m2_s2)
+    def found_s(self, variance_m2_s2: float) -> tuple[float, float]:
+        """The delay and its standard deviation; `variance_m2_s2`: of steps on an axis at constant acceleration."""
+        # Of what was known before, beside the squares of what is measured.
+        weight = self.repeats * variance_m2_s2 / self.spread_s**2
         total = weight + self._square
-        found_s = (weight * self.expected_s + self._against) / total if total > 0.0 else self.expected_s
-        return min(max(found_s, 0.0), self.longest_s)
-
-    def error_s(self, variance_m2_s2: float) -> float:
-        """Its standard deviation."""
-        weight = self._weight(variance_m2_s2)
-        total = weight + self._square
-        return self.spread_s * math.sqrt(weight / total) if total > 0.0 else self.spread_s
-
-    def _weight(self, variance_m2_s2: float) -> float:
-        """Of what was known before, beside the squares of what is measured."""
-        return self.repeats * variance_m2_s2 / self.spread_s**2
+        if total <= 0.0:
+            return self.expected_s, self.spread_s
+        found_s = (weight * self.expected_s + self._against) / total
+        return min(max(found_s, 0.0), self.longest_s), self.spread_s * math.sqrt(weight / total)

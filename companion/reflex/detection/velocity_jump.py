@@ -48,8 +48,7 @@ class VelocityJump:
         pairs = zip(pairwise(recent), apart_us, strict=True)
         change = _newest_less_mean(_rate(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
         self.newest, self.compared_us = (step, change), times[1:]
-        late_s = self.delay.delay_s(self.variance_m2_s2)
-        return plus(step, late_s, change)
+        return plus(step, self.delay.found_s(self.variance_m2_s2)[0], change)
 
     def learn(self, step: Vector3) -> None:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""

@@ -193,12 +193,10 @@ class MotionEstimator:
         now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
         known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
         known.predict(now_us, self._summed_m_s)
-        is_odd = known.deviation(doppler) > GATE
-        was_odd, self._was_odd = self._was_odd, is_odd
-        if is_odd and not was_odd:
-            return
         since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
-        known.update(doppler)
+        was_odd, self._was_odd = self._was_odd, known.update(doppler, self._was_odd)
+        if self._was_odd and not was_odd:
+            return
         self._measured = known
         if self._has_agreed:
             return
