@@ -7,6 +7,7 @@ from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import DISARM, DISARM_BY_FORCE
 from companion.motion.rotation import tilt_rad
+from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition | None:
@@ -16,9 +17,9 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
         return None
     hits = flight.hits
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
-    if watch.is_tipped:
+    if watch.tipped.lasts_us >= TIPPED_US:
         how = "tipped over"
-    elif has_unsettled and not goes_down and watch.is_low:
+    elif has_unsettled and not goes_down and watch.low.lasts_us >= LOW_US:
         how = "on the floor after a hit"
     elif has_unsettled and _is_pressed(flight, now_us):
         how = "pressed to what was hit"
@@ -73,7 +74,7 @@ class Crashed(Handler[FlightContext]):
         if not flight.is_wreck:
             return Transition(Trigger.FLIES_AGAIN, f"{flight.crashed}; it flies again, in other hands")
         watch, client = flight.reflex.crash, flight.command_client
-        if not watch.lies:
+        if watch.lying.lasts_us < LIES_US:
             client.cancel()
         elif flight.mission.on_crash == "disarm" and client.pending is None and now_us >= self._ask_us:
             client.begin(DISARM_BY_FORCE if self._is_forced else DISARM)

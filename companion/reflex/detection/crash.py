@@ -24,18 +24,6 @@ class CrashWatch:
     force_frd_m_s2: Vector3 = ZERO
     rates_frd_rad_s: Vector3 = ZERO
 
-    @property
-    def is_tipped(self) -> bool:
-        return self.tipped.lasts_us >= reflex.TIPPED_US
-
-    @property
-    def is_low(self) -> bool:
-        return self.low.lasts_us >= reflex.LOW_US
-
-    @property
-    def lies(self) -> bool:
-        return self.lying.lasts_us >= reflex.LIES_US
-
     def update(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """`height_m`: above the arming position, None where it is not known."""
         for sample in samples:
@@ -48,13 +36,10 @@ class CrashWatch:
                     self.tipped.update(tilt_rad(sample.attitude_wxyz) > reflex.TIPPED_RAD, sample.time_boot_us)
                 case LocalPosition():
                     self.is_near = height_m is not None and height_m < reflex.LOW_M
-                    self._rest(sample, landed)
-
-    def _rest(self, sample: LocalPosition, landed: LandedState) -> None:
-        is_still = self.is_near and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
-        self.low.update(is_still, sample.time_boot_us)
-        is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < reflex.STILL_M_S2
-        self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.CARRIED_SHARE * GRAVITY_M_S2
-        turns = math.hypot(*self.rates_frd_rad_s) > reflex.STILL_RAD_S
-        lies = self.is_carried or landed is LandedState.ON_GROUND
-        self.lying.update(is_still and lies and not turns, sample.time_boot_us)
+                    is_still = self.is_near and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
+                    self.low.update(is_still, sample.time_boot_us)
+                    is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < reflex.STILL_M_S2
+                    self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.CARRIED_SHARE * GRAVITY_M_S2
+                    turns = math.hypot(*self.rates_frd_rad_s) > reflex.STILL_RAD_S
+                    lies = self.is_carried or landed is LandedState.ON_GROUND
+                    self.lying.update(is_still and lies and not turns, sample.time_boot_us)

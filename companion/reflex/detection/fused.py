@@ -82,45 +82,33 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
-    def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
-        """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
-        speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
-        p, q, r = rates_frd_rad_s
-        turning_rad_s = abs(p) + abs(q) + abs(r)
-        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
-
-    def side_force(self, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
-        """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
+    def side_force(self, config: FusedConfig, sample: ImuSample) -> tuple[float, float, bool]:
+        """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
 
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        force, mean = force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2]
-        alone = math.dist(force, mean)
+        (p, q, r), (f_x, f_y, _) = sample.angular_velocity_frd_rad_s, sample.specific_force_frd_m_s2
+        speed_m_s, turning_rad_s = math.hypot(*self.velocity_ned_m_s or ZERO), abs(p) + abs(q) + abs(r)
+        # On a turning vehicle drag changes direction faster than its mean follows.
+        drag_m_s2 = config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
+        (m_x, m_y, _), limit = self.floor.mean_frd_m_s2, self.threshold_m_s2 + drag_m_s2
+        alone = math.dist((f_x, f_y), (m_x, m_y))
         if self.phase is not Phase.ARMED:
-            return alone, 1.0, False
-        if math.hypot(*mean) > config.side_threshold_m_s2:
+            return alone, limit, False
+        if math.hypot(m_x, m_y) > config.side_threshold_m_s2:
             # The mean is a push, whose end is no hit.
-            alone = min(alone, math.hypot(*force))
+            alone = min(alone, math.hypot(f_x, f_y))
         if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
-            return alone, 1.0, False
-        together, of_two = self._together_m_s2(force_frd_m_s2), self.before_threshold_m_s2 / self.threshold_m_s2
-        return (together, of_two, True) if together / of_two > alone / reflex.CLEAR else (alone, reflex.CLEAR, False)
-
-    def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
-        """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
-        noise of a sum grows. Vibration alternates, a contact does not.
-
-        Compared with zero, too: a slow swing that the mean has not followed is none.
-        """
-        (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
-        x, y = f_x + g_x, f_y + g_y
-        return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
-
-    @property
-    def weak_force(self) -> float:
-        """The larger force of the last two samples, in limits."""
-        return max(self.force[0], self.force_before[0])
+            return alone, limit, False
+        # Two count as one: their sum over the root of two, by which the noise of a sum grows. Vibration alternates, a
+        # contact does not. Compared with zero, too: a slow swing that the mean has not followed is none.
+        x, y = f_x + self.last_frd_m_s2[0], f_y + self.last_frd_m_s2[1]
+        together = math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
+        of_two = self.before_threshold_m_s2 / self.threshold_m_s2
+        if together / of_two > alone / reflex.CLEAR:
+            return together, of_two * limit, True
+        return alone, reflex.CLEAR * limit, False
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large
@@ -181,19 +169,17 @@ class FusedDetector:
 
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
         config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
-        w, off = sample.angular_velocity_frd_rad_s, situation.off_reason
+        off = situation.off_reason
         if off is None and situation.landed_state is LandedState.ON_GROUND:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
-        s.turn.imu(before_us, now_us, w, config)
-        side, thresholds, is_of_two = s.side_force(config, f)
+        s.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, config)
+        s.side.value, s.side.limit, is_of_two = s.side_force(config, sample)
         if is_of_two:
             free_until_us = earlier_us
-        beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
-        s.side.value, s.side.limit = side, thresholds * s.side_threshold_m_s2(config, w)
-        s.vertical.value, s.vertical.limit = beyond, s.vertical_threshold_m_s2
-        ratio = max(side / s.side.limit, beyond / s.vertical.limit)
+        s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
+        ratio = max(s.side.value / s.side.limit, s.vertical.value / s.vertical.limit)
         s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
@@ -327,7 +313,8 @@ class FusedDetector:
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.ratio
         # What is not of one moment adds to a jump, and not to each other.
-        is_weak = ratio <= 1.0 < math.hypot(ratio, max(s.turn.shown, s.weak_force)) and not s.may_be_hand(time_us)
+        other = max(s.turn.shown, s.force[0], s.force_before[0])
+        is_weak = ratio <= 1.0 < math.hypot(ratio, other) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
         is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.shown) > 1.0)
         if s.phase is not Phase.ARMED or not is_jump:

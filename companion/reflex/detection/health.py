@@ -18,25 +18,23 @@ class StreamHealth:
     """Time and rate of the received IMU samples, on the companion's clock. Changed only by `imu`."""
 
     started_us: int
-    last_heard_us: int
     arrivals_us: deque[int] = field(default_factory=deque)
     """Of the samples in the second up to the newest, since the latest silence."""
 
-    def imu(self, samples: int, config: StreamHealthConfig, now_us: int) -> None:
-        """Take the number of samples that arrived by ``now_us``; after a silence, in which a link held them, as one."""
-        if samples and now_us - self.last_heard_us > config.silence_s * 1e6:
-            self.arrivals_us.clear()
-            samples = 1
-        if not samples:
-            return
-        self.last_heard_us = now_us
-        self.arrivals_us.extend([now_us] * samples)
-        while now_us - self.arrivals_us[0] >= 1e6:
-            self.arrivals_us.popleft()
+    def imu(self, samples: int, config: StreamHealthConfig, now_us: int) -> str | None:
+        """Take the number of samples that arrived by ``now_us``; after a silence, in which a link held them, as one.
 
-    def fault(self, config: StreamHealthConfig, now_us: int) -> str | None:
-        """What is wrong with the stream in one phrase, or None."""
-        if now_us - self.last_heard_us > config.silence_s * 1e6:
+        Returns what is wrong with the stream in one phrase, or None.
+        """
+        last_heard_us = self.arrivals_us[-1] if self.arrivals_us else self.started_us
+        is_silent = now_us - last_heard_us > config.silence_s * 1e6
+        if samples:
+            if is_silent:
+                self.arrivals_us.clear()
+            self.arrivals_us.extend([now_us] * (1 if is_silent else samples))
+            while now_us - self.arrivals_us[0] >= 1e6:
+                self.arrivals_us.popleft()
+        elif is_silent:
             return f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
         rate_hz = len(self.arrivals_us)
         if rate_hz < config.min_rate_hz and now_us - self.started_us >= 1e6:

@@ -99,7 +99,7 @@ def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonit
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
     return CollisionMonitor(
-        config, detector, detector.initial(), ImpactEstimator(config.estimate), StreamHealth(now_us, now_us)
+        config, detector, detector.initial(), ImpactEstimator(config.estimate), StreamHealth(now_us)
     )
 
 
@@ -142,20 +142,12 @@ def advance(
             impacts.append(estimator.begin(impact))
         elif type(sample) is ImuSample and estimator.estimate is not None and not estimator.estimate.is_final:
             estimator.follow(sample, monitor.state)
-    monitor.stream_health.imu(imu_samples, sight, now_us)
-    if now_us - monitor.promised_us >= 1e6:
-        _promise(monitor, now_us)
-    return impacts, _notices(monitor, is_on, now_us)
-
-
-def _promise(monitor: CollisionMonitor, now_us: int) -> None:
-    """Once a second, of an armed detector whose noise is known."""
-    state = monitor.state
-    if isinstance(state, FusedState) and state.phase is Phase.ARMED:
-        fixes, imu_hz = monitor.estimator.strapdown.fixes, len(monitor.stream_health.arrivals_us)
-        counted = MessageId.ODOMETRY in monitor.heard
-        monitor.promise = promise_of(state, monitor.config.fused, fixes, imu_hz, counted)
+    fault, state = monitor.stream_health.imu(imu_samples, sight, now_us), monitor.state
+    if now_us - monitor.promised_us >= 1e6 and isinstance(state, FusedState) and state.phase is Phase.ARMED:
+        imu_hz, counted = len(monitor.stream_health.arrivals_us), MessageId.ODOMETRY in monitor.heard
+        monitor.promise = promise_of(state, monitor.config.fused, estimator.strapdown.fixes, imu_hz, counted)
         monitor.promised_us = now_us
+    return impacts, _notices(monitor, is_on, fault, now_us)
 
 
 def _vibration(state: DetectorState) -> str:
@@ -163,24 +155,19 @@ def _vibration(state: DetectorState) -> str:
     return f"vibration hides hits below {state.threshold_m_s2:.0f} m/s^2"
 
 
-def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
-    """Why an armed detector could miss a hit, in one phrase, or None."""
-    config = monitor.config.sight
-    fault = monitor.stream_health.fault(config, now_us)
-    if fault is not None:
-        return monitor.imu_fault or fault
-    if monitor.state.threshold_m_s2 > config.max_threshold_m_s2:
-        return _vibration(monitor.state)
-    return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
-
-
-def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice]:
+def _notices(monitor: CollisionMonitor, is_on: bool, fault: str | None, now_us: int) -> list[Notice]:
     """Whether the detector sees while it is on, and whether the velocity is valid once the contact is over.
 
-    Each when it changes; threshold and losses once.
+    Each when it changes; threshold and losses once. `fault`: what is wrong with the IMU's stream.
     """
     notices: list[Notice] = []
-    was, reason = monitor.no_data_reason, _stream_fault(monitor, now_us) if is_on else None
+    sight, was, reason = monitor.config.sight, monitor.no_data_reason, None
+    if is_on and fault is not None:
+        reason = monitor.imu_fault or fault
+    elif is_on and monitor.state.threshold_m_s2 > sight.max_threshold_m_s2:
+        reason = _vibration(monitor.state)
+    elif is_on and monitor.is_attitude_old:
+        reason = f"no ATTITUDE_QUATERNION for {round(sight.silence_s * 1e3)} ms"
     monitor.no_data_reason = reason
     if (reason is None) != (was is None) and is_on:
         notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}"))
