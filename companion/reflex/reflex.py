@@ -126,10 +126,8 @@ class Reflex:
                     force.forget()
                 elif late_us >= 0:
                     continue
-                if is_free:
-                    force.learn_wind(sample, self.monitor.estimator.strapdown.valid_wxyz)
                 # What has just been hit may have turned it.
-                held = force.step(sample, self.monitor.estimator.strapdown, flown_to, is_watched and is_free)
+                held = force.step(sample, self.monitor.estimator.strapdown, flown_to, is_free, is_watched)
                 if held is not None:
                     return held
         return None

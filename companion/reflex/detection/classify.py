@@ -51,34 +51,28 @@ class Touch:
         return height_m is None or height_m < GROUND_M
 
     @property
-    def comes_down(self) -> bool:
-        """Whether the ground is what the vehicle moves towards, rather than something beside it."""
-        north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
-        return down_m_s > math.hypot(north_m_s, east_m_s)
-
-    @property
     def meets_ground(self) -> bool:
-        """The place of arming may lie higher or lower than the ground here: what comes down meets it at any height."""
+        """The place of arming may lie higher or lower than the ground here: what comes down, rather than sideways,
+        meets it at any height.
+        """
+        north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s or ZERO
+        comes_down = down_m_s > math.hypot(north_m_s, east_m_s)
         is_let_down = self.situation.flown_by_hand and self.situation.descent_commanded
-        return self.near_ground or (self.comes_down and (self.is_pushed_up or is_let_down))
+        return self.near_ground or (comes_down and (self.is_pushed_up or is_let_down))
 
     @property
     def is_pushed_up(self) -> bool:
         return self.upward > STEEP
 
     @property
-    def is_upright(self) -> bool:
-        return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP
-
-    @property
-    def is_slow(self) -> bool:
-        """What has not climbed since it stood on the ground cannot have fallen, whatever its climb rate says; and what
-        falls loses height.
+    def may_land(self) -> bool:
+        """Upright, and slow: what has not climbed since it stood on the ground cannot have fallen, whatever its climb
+        rate says; and what falls loses height.
         """
         rates_m_s = [] if self.velocity_ned_m_s is None else [self.velocity_ned_m_s[2]]
         rates_m_s += [] if self.sinking_m_s is None else [self.sinking_m_s]
-        is_fast = min(rates_m_s, default=0.0) >= FASTEST_LANDING_M_S
-        return not (is_fast and self.situation.has_climbed)
+        is_fast = self.situation.has_climbed and min(rates_m_s, default=0.0) >= FASTEST_LANDING_M_S
+        return math.cos(tilt_rad(self.attitude_wxyz)) > STEEP and not is_fast
 
     @property
     def has_landed(self) -> bool:
@@ -103,7 +97,7 @@ TABLE = (
         ImpactKind.CRASH,
         "near the ground, or coming down and pushed from below or flown down by hand; "
         "tilted by over 45 degrees, or sinking at over 3.1 m/s, by velocity and by height, after a climb",
-        lambda touch: touch.meets_ground and not (touch.is_upright and touch.is_slow),
+        lambda touch: touch.meets_ground and not touch.may_land,
     ),
     Row(
         ImpactKind.LANDING,

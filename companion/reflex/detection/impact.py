@@ -60,16 +60,11 @@ class ContactForce:
         largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
         least = 0.5 * along(largest, largest)
         lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
-        return lasting > SHORT and not self._lacks_some
-
-    @property
-    def _lacks_some(self) -> bool:
-        """Whether it is over and has not even stopped the vehicle's way into it: a chattering frame's pulses are short,
-        and each is clipped.
-        """
         impulse_m_s = self.impulse_ned_m_s
         off_m_s = along(plus(self.came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
-        return self.is_over and off_m_s < -SAME_M_S
+        # One that is over and has not even stopped the vehicle's way into it lacks some: a chattering frame's pulses
+        # are short, and each is clipped.
+        return lasting > SHORT and not (self.is_over and off_m_s < -SAME_M_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +169,15 @@ class ImpactEstimator(Motion):
         assert estimate is not None, "an impact has begun"
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
             contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
-            estimate = self._refined(estimate, contact)
+            if contact.begun_boot_us is not None and estimate.impact.evidence is Evidence.FORCE:
+                error_us = contact.averaging_us // 4
+                estimate = replace(estimate, time_boot_us=contact.begun_boot_us, time_error_us=error_us)
+            estimate = replace(
+                estimate,
+                normal=normal_of(contact.impulse_ned_m_s, contact.came_ned_m_s, self.hides_clipping),
+                peak_specific_force_m_s2=max(math.hypot(*force) for force in contact.forces_ned_m_s2),
+                impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
+            )
         if contact is not None:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
             contact.is_over = is_over
@@ -183,19 +186,6 @@ class ImpactEstimator(Motion):
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
-
-    def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
-        begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
-        if contact.begun_boot_us is not None and estimate.impact.evidence is Evidence.FORCE:
-            begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
-        return replace(
-            estimate,
-            time_boot_us=begun_us,
-            time_error_us=error_us,
-            normal=normal_of(contact.impulse_ned_m_s, contact.came_ned_m_s, self.hides_clipping),
-            peak_specific_force_m_s2=max(math.hypot(*force) for force in contact.forces_ned_m_s2),
-            impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
-        )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import shapely
 
-from companion.messages import AttitudeTarget, LocalPosition, Quaternion, Vector3
+from companion.messages import AttitudeTarget, LocalPosition, Vector3
 from companion.motion.config import GATE, GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import Strapdown
@@ -74,25 +74,21 @@ class SustainedForceMonitor:
         self.imu_count += 1
         self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
 
-    def learn_wind(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> None:
-        """Take one sample, before `step` does, of a vehicle that nothing touches."""
-        if self.time_us and hovers(sample.velocity_ned_m_s):
-            x, y, _ = self.measured_frd_m_s2
-            across = flat(body_to_ned(attitude_wxyz, (x, y, 0.0)))
-            elapsed_s = 1e-6 * (sample.time_boot_us - self.time_us)
-            self.hover_wind_m_s2 = towards(self.hover_wind_m_s2, across, elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
-
     def step(
-        self, sample: LocalPosition, strapdown: Strapdown, goal_ned_m: Vector3 | None, may_tip: bool = True
+        self, sample: LocalPosition, strapdown: Strapdown, goal_ned_m: Vector3 | None, is_free: bool, may_tip: bool
     ) -> ImpactEstimate | None:
         """Take one sample, the attitude and the setpoint as last sent; None while none is flown to.
 
         What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
-        `may_tip`: a vehicle that tips is looked for, too.
+        `is_free`: of a vehicle that nothing touches. `may_tip`: one that tips is looked for, too.
         """
-        now_us, attitude_wxyz, elapsed_s = sample.time_boot_us, strapdown.valid_wxyz, self._smooth(sample, strapdown)
-        thrust = self._held(sample, goal_ned_m, elapsed_s)
-        if thrust is None and may_tip:
+        now_us, attitude_wxyz = sample.time_boot_us, strapdown.valid_wxyz
+        if is_free and self.time_us and hovers(sample.velocity_ned_m_s):
+            x, y, _ = self.measured_frd_m_s2
+            across, elapsed_s = flat(body_to_ned(attitude_wxyz, (x, y, 0.0))), 1e-6 * (now_us - self.time_us)
+            self.hover_wind_m_s2 = towards(self.hover_wind_m_s2, across, elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
+        thrust = self._held(sample, goal_ned_m, self._smooth(sample, strapdown))
+        if thrust is None and is_free and may_tip:
             thrust = self._tipped(strapdown)
         if thrust is None:
             return None

@@ -54,7 +54,7 @@ def watched(
         for at_s, sample, goal in waiting:
             if asked_m_s2 is not None:
                 monitor.set_attitude(AttitudeTarget(sample.time_boot_us, 0.0, leaning(asked_m_s2(at_s))))
-            held = monitor.step(sample, strapdown, goal)
+            held = monitor.step(sample, strapdown, goal, True, True)
             if held is not None:
                 return at_s, held
         waiting.clear()
