@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass, field
 
 from companion.messages import GpsFix, LocalPosition, Vector3
-from companion.motion import config as motion
+from companion.motion import config as numbers
 from companion.motion.delay import Delay
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, flat, limited, minus, plus, towards
@@ -26,11 +26,11 @@ class Doppler:
     taken_boot_us: int = -1  # the newest velocity was measured later than this
     velocity_ned_m_s: Vector3 = ZERO  # as of the newest IMU sample; horizontal
     late_s: float = 0.0  # carried on by so much
-    variance_m2_s2: float = motion.DOPPLER_M_S**2
+    variance_m2_s2: float = numbers.DOPPLER_M_S**2
     known: int = 1
     delay: Delay = field(
         default_factory=lambda: Delay(
-            motion.RECEIVER_DELAY_S, motion.RECEIVER_SPREAD_S, motion.RECEIVER_LATEST_S, motion.RECEIVER_REPEATS
+            numbers.RECEIVER_DELAY_S, numbers.RECEIVER_SPREAD_S, numbers.RECEIVER_LATEST_S, numbers.RECEIVER_REPEATS
         )
     )
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
@@ -47,7 +47,7 @@ class Doppler:
         if faster is None:
             return
         n, e = sample.velocity_ne_m_s
-        self.taken_boot_us = strapdown.time_boot_us - round(1e6 * (late_s + motion.CERTAIN * error_s))
+        self.taken_boot_us = strapdown.time_boot_us - round(1e6 * (late_s + numbers.CERTAIN * error_s))
         self.velocity_ned_m_s = (n + faster[0], e + faster[1], 0.0)
         place = plus(self._counted_m(sample), 0.5 * late_s, plus((n, e, 0.0), 1.0, self.velocity_ned_m_s))
         if is_free and own is not None:
@@ -61,21 +61,25 @@ class Doppler:
         first = self._first = self._first or sample
         north_rad = math.radians(sample.latitude_deg - first.latitude_deg)
         east_rad = math.remainder(math.radians(sample.longitude_deg - first.longitude_deg), math.tau)
-        return (motion.EARTH_M * north_rad, motion.EARTH_M * east_rad * math.cos(math.radians(first.latitude_deg)), 0.0)
+        return (
+            numbers.EARTH_M * north_rad,
+            numbers.EARTH_M * east_rad * math.cos(math.radians(first.latitude_deg)),
+            0.0,
+        )
 
     def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
-        faster = _faster_by(strapdown, motion.RECEIVER_DELAY_S)
+        faster = _faster_by(strapdown, numbers.RECEIVER_DELAY_S)
         if faster is None:
             return
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
-        change = plus(ZERO, 1.0 / motion.RECEIVER_DELAY_S, faster)
-        most_m_s = motion.GATE * math.sqrt(self.variance_m2_s2)
+        change = plus(ZERO, 1.0 / numbers.RECEIVER_DELAY_S, faster)
+        most_m_s = numbers.GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
         if math.hypot(*plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change)) < most_m_s:
             self.delay.learn(behind, change)
         noise = limited(plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change), most_m_s)
-        self.known = min(self.known + 1, motion.MEMORY)
+        self.known = min(self.known + 1, numbers.MEMORY)
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 
 
@@ -93,7 +97,7 @@ class MeasuredVelocity:
     taken_boot_us: int = -1  # when the newest of its velocities was measured
     unseen_m_s2: Vector3 = ZERO
     both_m2_s3: float = 0.0  # covariance of v and b
-    unseen_variance_m2_s4: float = motion.LEVEL_SPREAD_M_S2**2
+    unseen_variance_m2_s4: float = numbers.LEVEL_SPREAD_M_S2**2
 
     def predict(self, time_boot_us: int, summed_m_s: Vector3) -> None:
         """Up to a time, with the accelerometer's integral until then."""
@@ -101,10 +105,10 @@ class MeasuredVelocity:
         faster = plus(minus(summed_m_s, self.summed_m_s), elapsed_s, self.unseen_m_s2)
         self.velocity_ned_m_s = plus(self.velocity_ned_m_s, 1.0, faster)
         self.variance_m2_s2 += elapsed_s * (
-            2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + motion.DRIFT_M2_S3
+            2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + numbers.DRIFT_M2_S3
         )
         self.both_m2_s3 += elapsed_s * self.unseen_variance_m2_s4
-        self.unseen_variance_m2_s4 += motion.LEVEL_DRIFT_M2_S5 * elapsed_s
+        self.unseen_variance_m2_s4 += numbers.LEVEL_DRIFT_M2_S5 * elapsed_s
         self.time_boot_us, self.summed_m_s = time_boot_us, summed_m_s
 
     def update(self, doppler: Doppler, was_odd: bool) -> bool:
@@ -114,8 +118,8 @@ class MeasuredVelocity:
         with_v = self.variance_m2_s2 - late_s * self.both_m2_s3
         with_b = self.both_m2_s3 - late_s * self.unseen_variance_m2_s4
         # No receiver is better than the best.
-        variance = with_v - late_s * with_b + max(doppler.variance_m2_s2, motion.FINEST_DOPPLER_M_S**2)
-        is_odd = math.hypot(*innovation) / math.sqrt(variance) > motion.GATE
+        variance = with_v - late_s * with_b + max(doppler.variance_m2_s2, numbers.FINEST_DOPPLER_M_S**2)
+        is_odd = math.hypot(*innovation) / math.sqrt(variance) > numbers.GATE
         if was_odd or not is_odd:
             self.velocity_ned_m_s = plus(self.velocity_ned_m_s, with_v / variance, innovation)
             self.unseen_m_s2 = plus(self.unseen_m_s2, with_b / variance, innovation)

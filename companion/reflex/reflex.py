@@ -151,15 +151,7 @@ class Reflex:
             contact, first_us, expected, self.config.estimate, is_second, fits_models, wind_m_s2
         )
         estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
-        record = CollisionRecord(
-            detected_at_us=now_us,
-            sample_time_boot_us=first_us,
-            detector=self.config.detector,
-            contact=contact,
-            peak_specific_force_m_s2=impact.size_m_s2,
-            estimator=estimator,
-            source=source,
-        )
+        record = CollisionRecord(now_us, self.config.detector, contact, impact.size_m_s2, estimator, source)
         if before is None and self._is_attitude_heard:
             force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
@@ -216,7 +208,7 @@ class Reflex:
         newest = self.newest
         if newest is None or not newest.estimator.has_converged:
             return 0.0
-        left_us = newest.sample_time_boot_us + numbers.FADED_US - time_boot_us
+        left_us = newest.estimator.hit_boot_us + numbers.FADED_US - time_boot_us
         share = left_us / (numbers.FADED_US - numbers.FADES_FROM_US)
         return 1.0 if newest.estimator.is_measured_apart else min(max(share, 0.0), 1.0)
 

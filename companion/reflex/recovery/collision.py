@@ -48,7 +48,6 @@ class CollisionRecord:
     """Positions and velocities in local NED; boot times in the vehicle's clock."""
 
     detected_at_us: int
-    sample_time_boot_us: int
     detector: str
     contact: Contact
     peak_specific_force_m_s2: float
@@ -65,38 +64,34 @@ class CollisionRecord:
     def normal(self) -> Normal:
         """The obstacle's normal by all that is known now."""
         before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
-        normal, after_m_s = estimator.normal, estimator.after_ned_m_s
-        if after_m_s is not None:
-            error_m_s = math.hypot(self.contact.velocity_error_m_s, estimator.after_error_m_s)
-            normal = with_change(normal, before_m_s, after_m_s, error_m_s)
-        return level(normal)
+        error_m_s = math.hypot(self.contact.velocity_error_m_s, estimator.after_error_m_s)
+        return level(with_change(estimator.normal, before_m_s, estimator.after_ned_m_s, error_m_s))
 
     def follow(self, state: DetectorState, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
-        strapdown, estimate = self.source.strapdown, self.source.estimate
+        strapdown, estimate, hit_us = self.source.strapdown, self.source.estimate, self.estimator.hit_boot_us
         # In these phases the state still describes the contact.
         is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
         # A velocity that shows it may have come before the sample of the same time.
         is_larger = state.peak_specific_force_m_s2 > self.peak_specific_force_m_s2
-        is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > self.sample_time_boot_us)
+        is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > hit_us)
         if self.hypothesis is not None:
             is_turned = self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
             self.hypothesis = None if is_turned or is_seen_again else self.hypothesis
-        if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
+        if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == hit_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
             self.estimator.note_contact(
                 estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal, estimate.impulse_m_s
             )
         self.estimator.imu(strapdown)
         self.estimator.measure(self.source.doppler)
-        is_left = strapdown.time_boot_us - self.sample_time_boot_us <= FADED_US or self.estimator.is_measured_apart
-        if self.is_over and is_left:
+        if self.is_over and (strapdown.time_boot_us - hit_us <= FADED_US or self.estimator.is_measured_apart):
             for sample in positions:
                 self.estimator.update(sample)
 
     def is_rejected(self, now_boot_us: int) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
-        if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
+        if self.hypothesis is None or now_boot_us - self.estimator.hit_boot_us < DECIDED_US:
             return False
         hypothesis, source, self.hypothesis = self.hypothesis, self.source, None
         return hypothesis.is_rejected(source.strapdown.fixes, source.history, source.config.position_noise_m)
@@ -115,7 +110,7 @@ class CollisionRecord:
         velocity = self.contact.velocity_ned_m_s
         return CollisionReport(
             detected_at_us=self.detected_at_us,
-            sample_time_boot_us=self.sample_time_boot_us,
+            sample_time_boot_us=self.estimator.hit_boot_us,
             detector=self.detector,
             position_ned_m=self.contact.position_ned_m,
             impact_velocity_ned_m_s=velocity,

@@ -15,17 +15,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 from companion.messages import LocalPosition, Vector3
-from companion.motion.config import (
-    CURRENT_US,
-    DELAY_S,
-    GATE,
-    GRAVITY_M_S2,
-    LEVEL_SPREAD_M_S2,
-    LONGEST_GAP_US,
-    SAME_M_S,
-    SHOWN_US,
-    STAMP_RESOLUTION_US,
-)
+from companion.motion import config as numbers
+from companion.motion.config import GRAVITY_M_S2, SAME_M_S
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.settling import Lasting
@@ -61,8 +52,8 @@ class MotionEstimator:
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
-    after_ned_m_s: Vector3 | None = None  # the velocity just after the contact, by when it was known best
-    after_error_m_s: float = math.inf  # its standard deviation
+    after_ned_m_s: Vector3 = ZERO  # the velocity just after the contact, by when it was known best
+    after_error_m_s: float = math.inf  # its standard deviation; infinite until it is known
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
@@ -101,7 +92,7 @@ class MotionEstimator:
         self.is_fully_measured, self.normal = is_fully_measured and not self.is_second, normal
         if is_pushed:
             self.pushed_boot_us, self._released_m_s = pushed_boot_us, self._summed_m_s
-            self.after_ned_m_s, self.after_error_m_s = None, math.inf
+            self.after_error_m_s = math.inf
         if not self.is_fully_measured and (is_pushed or was_measured):
             self._begin(impulse_m_s)
 
@@ -112,7 +103,7 @@ class MotionEstimator:
         if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
             # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
             self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
-        if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
+        if not 0.0 < elapsed_s < 1e-6 * numbers.LONGEST_GAP_US:
             return
         pushed = strapdown.acceleration_ned_m_s2
         pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
@@ -166,11 +157,14 @@ class MotionEstimator:
     def belief(self, strapdown: Strapdown) -> Belief:
         """What the attitude law goes by."""
         motion = self.motion
+        ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, reflex.TILT_AHEAD_S)
+        n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
+        upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
         return Belief(
             motion.position_ned_m,
             motion.velocity_ned_m_s,
             self.spread_m_s,
-            tilt_ahead(strapdown),
+            (n / upright, e / upright, 0.0),
             self.wind_m_s2,
             strapdown.valid_wxyz,
             strapdown.rates_frd_rad_s[2],
@@ -202,7 +196,7 @@ class MotionEstimator:
             return
         place = self.motion.position_ned_m
         if doppler.place_ned_m is not None:
-            off = limited(flat(minus(doppler.place_ned_m, place)), GATE * reflex.PLACE_SPREAD_M)
+            off = limited(flat(minus(doppler.place_ned_m, place)), numbers.GATE * reflex.PLACE_SPREAD_M)
             place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
         self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
 
@@ -211,7 +205,7 @@ class MotionEstimator:
         """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
         if self._measured is None or self.is_fully_measured or self._has_agreed:
             return False
-        return self._time_boot_us - self._measured.taken_boot_us < CURRENT_US
+        return self._time_boot_us - self._measured.taken_boot_us < numbers.CURRENT_US
 
     @property
     def is_known(self) -> bool:
@@ -244,7 +238,7 @@ class MotionEstimator:
     def _look_back(self) -> None:
         """The velocity just after the contact: the present one less what the accelerometer has shown since."""
         since_s = 1e-6 * (self._time_boot_us - self.pushed_boot_us)
-        error_m_s = math.hypot(self.spread_m_s, LEVEL_SPREAD_M_S2 * since_s)
+        error_m_s = math.hypot(self.spread_m_s, numbers.LEVEL_SPREAD_M_S2 * since_s)
         if error_m_s < self.after_error_m_s:
             flown_m_s = minus(self._summed_m_s, self._released_m_s)
             self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, flown_m_s)
@@ -252,7 +246,7 @@ class MotionEstimator:
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
-        at_us = sample.time_boot_us - round(1e6 * DELAY_S)
+        at_us = sample.time_boot_us - round(1e6 * numbers.DELAY_S)
         if at_us <= self.hit_boot_us:
             return
         if self.is_fully_measured:
@@ -266,7 +260,7 @@ class MotionEstimator:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
         now_us, bank = self._time_boot_us or at_us, self._bank
         before_us = self.hit_boot_us if bank is None else bank.time_boot_us
-        if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= before_us:
+        if abs(now_us - at_us) > numbers.LONGEST_GAP_US or now_us <= before_us:
             # The report's time is outside the integrated interval.
             return
         config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - before_us), 1e-6 * (now_us - at_us)
@@ -284,7 +278,7 @@ class MotionEstimator:
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
         velocity = plus(sample.velocity_ned_m_s, behind_s, self._smoothed_m_s2)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
-        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
+        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * numbers.STAMP_RESOLUTION_US))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
         off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
@@ -300,7 +294,7 @@ class MotionEstimator:
         is_known, error_m_s = self._swings_m_s <= SAME_M_S, bank.mean_error(1, g)
         if not self.fits_models:
             # By then a receiver's velocity has come, where there is one.
-            is_known = is_known and sample.time_boot_us - self.pushed_boot_us > CURRENT_US
+            is_known = is_known and sample.time_boot_us - self.pushed_boot_us > numbers.CURRENT_US
         is_apart = self.is_measured_apart
         self.has_converged = self.has_converged or (is_known and not is_apart)
         if is_apart or not self.has_converged:
@@ -323,7 +317,7 @@ class MotionEstimator:
         self._steady.update(is_known and math.dist(off, error) <= SAME_M_S, time_boot_us)
         # `spread_m_s` is the measured one's.
         self._same.update(math.hypot(*off) <= math.hypot(SAME_M_S, self.spread_m_s), time_boot_us)
-        is_steady = self.fits_models and self._steady.lasts_us > SHOWN_US
+        is_steady = self.fits_models and self._steady.lasts_us > numbers.SHOWN_US
         self._has_agreed = self._same.lasts_us > 1e6 * reflex.COMPARED_S
         self.has_converged = self.has_converged or is_steady or self._has_agreed
         self._hidden_error_m_s = ZERO if self._has_agreed else (error[0], error[1], climb_error_m_s)
@@ -341,7 +335,14 @@ class MotionEstimator:
             elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
             if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
-                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
+                # Errors of positions are shorter than those of velocities: what these lead further is an error.
+                half_s = 0.5 * elapsed_s
+                led = plus(
+                    plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s
+                )
+                further_m = minus(led, measured.position_ned_m)
+                error = plus(self._rate_error_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m)
+                self._rate_error_m_s = limited(error, 2.0 * SAME_M_S)
         place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
         if not self.is_measured_apart:
             velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
@@ -358,22 +359,3 @@ class MotionEstimator:
         place = minus(sample.position_ned_m, self.position_error_m)
         velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
-
-
-def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
-    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
-
-    The errors of positions are shorter than those of velocities. The reports are without the error so far.
-    """
-    half_s = 0.5 * elapsed_s
-    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
-    further_m = minus(led, measured.position_ned_m)
-    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
-
-
-def tilt_ahead(strapdown: Strapdown) -> Vector3:
-    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt of TILT_AHEAD_S later."""
-    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, reflex.TILT_AHEAD_S)
-    n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
-    upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
-    return (n / upright, e / upright, 0.0)

@@ -39,10 +39,10 @@ class Progress(NamedTuple):
     position from now on. `rebound_m_s`: the goal has moved. `settled_s`: the recovery is over.
     """
 
-    is_rejected: bool = False
-    rested_s: float | None = None
-    rebound_m_s: float | None = None
-    settled_s: float | None = None
+    is_rejected: bool
+    rested_s: float | None
+    rebound_m_s: float | None
+    settled_s: float | None
 
 
 class Recovery:
@@ -67,7 +67,7 @@ class Recovery:
         record.setpoint_ned_m = self._told_ned_m = self._goal(record.estimator.start)
         self._has_left = self._has_passed = False
         self._slow = Lasting()
-        self._held_since_us = record.sample_time_boot_us  # by a position
+        self._held_since_us = record.estimator.hit_boot_us  # by a position
         self._monitor = SettlingMonitor(settled)
 
     def take(self, sample: LocalPosition) -> Progress:
@@ -107,7 +107,7 @@ class Recovery:
         is_held = not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
         if since_us is None or not is_held or not self._is_known:
             return None
-        return max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
+        return max(0.0, 1e-6 * (since_us - record.estimator.hit_boot_us))
 
     def _follow(self, sample: LocalPosition) -> tuple[float | None, float | None]:
         """Set the goal again by contact and motion; hand over to it once the vehicle rests."""
@@ -116,7 +116,7 @@ class Recovery:
         record.setpoint_ned_m = place = self._goal(motion)
         if self.leans and self._rests(sample):
             self.leans, self._held_since_us, record.overshoot_m = False, sample.time_boot_us, 0.0
-            rested_s = 1e-6 * (sample.time_boot_us - record.sample_time_boot_us)
+            rested_s = 1e-6 * (sample.time_boot_us - record.estimator.hit_boot_us)
         elif not self._is_known:
             return None, None
         if math.dist(place, self._told_ned_m) <= self._settled.distance_m:

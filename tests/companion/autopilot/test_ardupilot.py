@@ -155,7 +155,7 @@ def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_i
 )
 def test_words_are_left_until_a_vehicle_flies_well_by_itself(vehicle, later_s, said_s):
     f = leaning(vehicle())
-    f.companion.core.reflex.hits[-1].sample_time_boot_us -= round(1e6 * later_s)
+    f.companion.core.reflex.hits[-1].estimator.hit_boot_us -= round(1e6 * later_s)
     assert [at_s for at_s, _ in f.companion.last_words()] == pytest.approx(said_s)
 
 

@@ -45,7 +45,7 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     source = reflex.monitor.estimator
-    reflex.newest = CollisionRecord(0, HIT_US, "fused", estimator.contact, 20.0, estimator, source)
+    reflex.newest = CollisionRecord(0, "fused", estimator.contact, 20.0, estimator, source)
     flight.collisions.append(reflex.newest)
     return flight
 
@@ -351,7 +351,7 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
     estimator = flight.collisions[0].estimator
     estimator.has_converged, estimator._hidden_error_m_s = True, (0.0, wrong_m_s, 0.0)
     estimator.position_error_m = estimator.level_m_s2 = (wrong_m_s, wrong_m_s, 0.0)
-    asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].sample_time_boot_us
+    asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].estimator.hit_boot_us
 
     def sent() -> Target:
         return Limiter().in_vehicles_view(flight, asked, has_floor=True, time_boot_us=hit_us + 1_000_000)

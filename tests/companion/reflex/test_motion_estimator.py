@@ -144,7 +144,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.03)
     # until it is pushed again
     found.note_contact(True, strapdown.time_boot_us, found.normal, 0.0)
-    assert found.after_ned_m_s is None
+    assert found.after_error_m_s == math.inf
 
 
 def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
