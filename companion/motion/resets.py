@@ -74,14 +74,11 @@ class Resets:
             self._first = sample
         else:
             self._shifts[latest.reset_counter] = self.shift_ned_m
-            known = self._shifts.get(sample.reset_counter)
-            self.shift_ned_m = self._after(latest, first, most_m) if known is None else known
+            over_s = (first.time_boot_us - latest.time_boot_us) * 1e-6
+            jump = plus(minus(first.position_ned_m, latest.position_ned_m), -over_s, latest.velocity_ned_m_s)
+            shift = self.shift_ned_m if math.hypot(*jump) > most_m else plus(self.shift_ned_m, 1.0, jump)
+            self.shift_ned_m = self._shifts.get(sample.reset_counter, shift)
             self._latest, self._first, self._place = sample, None, None
-
-    def _after(self, before: Odometry, first: Odometry, most_m: float) -> Vector3:
-        over_s = (first.time_boot_us - before.time_boot_us) * 1e-6
-        jump = plus(minus(first.position_ned_m, before.position_ned_m), -over_s, before.velocity_ned_m_s)
-        return self.shift_ned_m if math.hypot(*jump) > most_m else plus(self.shift_ned_m, 1.0, jump)
 
     def sent(self, setpoint: PositionSetpoint | AttitudeSetpoint) -> PositionSetpoint | AttitudeSetpoint:
         """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""

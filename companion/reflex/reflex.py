@@ -27,7 +27,7 @@ from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.recovery.recovery import Recovery, Room
-from companion.reflex.surface import Surface, level
+from companion.reflex.surface import Surface, away_from
 
 
 class Reaction(NamedTuple):
@@ -81,17 +81,17 @@ class Reflex:
 
     def step(self, samples: Sequence[Sample], situation: Situation, now_us: int) -> Reaction:
         """Take the samples received since the last step, in order; call it without any, too."""
-        impacts, seen = advance(self.monitor, samples, situation, now_us)
+        impacts, notices = advance(self.monitor, samples, situation, now_us)
         # A crash is told where no hit is looked for, too.
         found = [each for each in impacts if each.impact.is_collision and not situation.off_reason] if impacts else []
         held = None if found else self._held(samples, situation)
-        if not impacts and held is None:
-            return Reaction((), False, seen) if seen else NOTHING_SHOWN
-        told = [] if situation.is_wreck else [self._contact_notice(each) for each in impacts]
+        if not situation.is_wreck:
+            notices += filter(None, map(self._contact_notice, impacts))
         if held is not None:
             found = [held]
-            told.append(_held_notice(held))
-        notices = [*seen, *(notice for notice in told if notice is not None)]
+            notices.append(_held_notice(held))
+        if not impacts and not notices:
+            return NOTHING_SHOWN
         return Reaction(found, any(each.impact.is_ground for each in impacts), notices)
 
     def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:
@@ -136,7 +136,7 @@ class Reflex:
 
     def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> CollisionRecord:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
-        impact, normal, earlier = estimate.impact, level(estimate.normal), self.in_one_recovery()
+        impact, normal, earlier = estimate.impact, estimate.normal, self.in_one_recovery()
         place, velocity, error_m_s = estimate.position_ned_m, estimate.velocity_ned_m_s, estimate.velocity_error_m_s
         before, law, source = next(iter(earlier), None), self.law, self.monitor.estimator
         is_second = law.follows and before is not None and not before.estimator.is_reported
@@ -144,7 +144,7 @@ class Reflex:
             # The vehicle's estimate is still wrong from the hit before.
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
             error_m_s = before.estimator.spread_m_s
-        contact = Contact(place, velocity, normal.direction_ned, normal.error_rad, error_m_s)
+        contact = Contact(place, velocity, away_from(normal.direction_ned), normal.error_rad, error_m_s)
         expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
         fits_models, wind_m_s2 = not source.hides_clipping, self.sustained_force.hover_wind_m_s2
         estimator = MotionEstimator(

@@ -57,14 +57,9 @@ def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3,
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
-    """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
+    """Unit normal out of the obstacle, horizontal if that is upright: no steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
     return unit((n, e, d if abs(d) > reflex.STEEP * math.hypot(n, e, d) else 0.0))
-
-
-def level(normal: Normal) -> Normal:
-    """The normal of an upright surface; of a steep one as it is."""
-    return Normal(away_from(normal.direction_ned), normal.error_rad)
 
 
 @dataclass(frozen=True, slots=True)

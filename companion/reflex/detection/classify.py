@@ -1,7 +1,7 @@
 """The kind of an impact: by what the vehicle did, then by what was asked of it. One table, read from above."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from companion.messages import Quaternion, Vector3
@@ -37,7 +37,7 @@ class Touch:
 
     @property
     def kind(self) -> ImpactKind:
-        return next(row.kind for row in TABLE if row.applies(self))
+        return next(kind for kind, _, applies in TABLE if applies(self))
 
     @property
     def upward(self) -> float:
@@ -82,36 +82,28 @@ class Touch:
         return is_as_low_as_feet or (self.situation.descent_commanded and (self.meets_ground or self.is_pushed_up))
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One kind with its criterion, in words and as code."""
-
-    kind: ImpactKind
-    criterion: str
-    applies: Callable[[Touch], bool]
-
-
-# The first row that applies counts. A hand (`contact`) is told by how its force begins, before this table.
-TABLE = (
-    Row(
+# Each kind with its criterion, in words and as code. The first row that applies counts. A hand (`contact`) is told by
+# how its force begins, before this table.
+TABLE: Sequence[tuple[ImpactKind, str, Callable[[Touch], bool]]] = (
+    (
         ImpactKind.CRASH,
         "near the ground, or coming down and pushed from below or flown down by hand; "
         "tilted by over 45 degrees, or sinking at over 3.1 m/s, by velocity and by height, after a climb",
         lambda touch: touch.meets_ground and not touch.may_land,
     ),
-    Row(
+    (
         ImpactKind.LANDING,
         "sent down, near the ground or pushed from below; flown down by hand; as low as the feet",
         lambda touch: touch.has_landed,
     ),
-    Row(
+    (
         ImpactKind.STRUCK,
         "hovering, away from the ground",
         lambda touch: hovers(touch.velocity_ned_m_s) and not touch.near_ground,
     ),
-    Row(ImpactKind.FLOOR, "pushed from below", lambda touch: touch.is_pushed_up),
-    Row(ImpactKind.CEILING, "pushed from above", lambda touch: touch.upward < -STEEP),
-    Row(ImpactKind.WALL, "pushed from the side", lambda touch: True),
+    (ImpactKind.FLOOR, "pushed from below", lambda touch: touch.is_pushed_up),
+    (ImpactKind.CEILING, "pushed from above", lambda touch: touch.upward < -STEEP),
+    (ImpactKind.WALL, "pushed from the side", lambda touch: True),
 )
 
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from statistics import median, stdev
 
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2
+from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
-from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
+from companion.reflex.config import STRUCK_M_S, SURE
 from companion.reflex.detection.detector import Evidence
 from companion.reflex.detection.impact import ImpactEstimate
 
@@ -52,8 +52,8 @@ class Hypothesis:
         of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
         """
         free_us, hit_us, in_sum_m_s, sure = self.free_until_boot_us, self.time_boot_us, 0.0, 0.0
-        was = [fix.less_sum_m_s for fix in fixes if free_us - DECIDED_US <= fix.time_boot_us <= free_us]
-        came = [fix.less_sum_m_s for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= DECIDED_US]
+        was = [fix.less_sum_m_s for fix in fixes if free_us - SHOWN_US <= fix.time_boot_us <= free_us]
+        came = [fix.less_sum_m_s for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= SHOWN_US]
         if len(was) < 2 or len(came) < 2:
             return False
         if self.earlier is not None:
@@ -77,16 +77,16 @@ class Hypothesis:
     def _stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
         """Whether the positions before and after show less than half of the jump, beyond their noise."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
-        was = self._came_m_s(history.between(free_us - DECIDED_US, free_us + 1))
-        came = self._came_m_s(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
+        was = self._came_m_s(history.between(free_us - SHOWN_US, free_us + 1))
+        came = self._came_m_s(history.between(hit_us + 1, hit_us + SHOWN_US + 1))
         least_m_s = 0.5 * self.change_m_s
-        if was is None or came is None or least_m_s * DECIDED_US * 1e-6 < SURE * position_noise_m:
+        if was is None or came is None or least_m_s * SHOWN_US * 1e-6 < SURE * position_noise_m:
             return False
         return came - was < least_m_s
 
     def _came_m_s(self, places: Sequence[LocalPosition]) -> float | None:
         """Speed of the positions along the jump, m/s; None for too few of them."""
-        if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
+        if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * SHOWN_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
         return along(minus(places[-1].position_ned_m, places[0].position_ned_m), self.away) / over_s

@@ -209,7 +209,7 @@ class FusedDetector:
             s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
-        return self._loud(s, situation, motion, impact, s.jumps(f))
+        return self._loud(s, situation, motion, impact, f)
 
     def _turned(self, s: FusedState, free_until_us: int, situation: Situation, motion: Motion) -> Impact | None:
         """What turned a vehicle that did not hover pushed it back: where to, only its velocity before says."""
@@ -253,9 +253,7 @@ class FusedDetector:
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
-    def _loud(
-        self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, has_jumped: bool
-    ) -> Impact | None:
+    def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
@@ -268,7 +266,7 @@ class FusedDetector:
             return None
         first = s.observed = s.observed or impact
         impact = replace(impact, contact_free_until_boot_us=first.contact_free_until_boot_us)
-        if size < self._config.soft_m_s2 and s.may_be_hand(now_us) and not has_jumped:
+        if size < self._config.soft_m_s2 and s.may_be_hand(now_us) and not s.jumps(f):
             if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             impact = replace(impact, kind=ImpactKind.CONTACT)

@@ -120,14 +120,15 @@ def promise_of(
 
     Each of the 3 axes of a velocity adds to its step, by Maxwell.
     """
-    per_hour = alarms_per_h(_ratio(state.threshold_m_s2, state.floor.side_m_s2), imu_hz)
+    side_m_s2 = state.floor.side_m_s2
+    per_hour = alarms_per_h(state.threshold_m_s2 / side_m_s2 if side_m_s2 > 0.0 else math.inf, imu_hz)
     if not state.jump.known or len(fixes) < 2:
         return Promise(state.threshold_m_s2, math.inf, per_hour)
     caution = 1.0 if resets_are_counted else 2.0
     jump_m_s = state.jump.least_m_s(config, caution, 0.0, 0)
-    r = _ratio(jump_m_s, math.sqrt(state.jump.variance_m2_s2))
     per_step = 0.0
-    if math.isfinite(r):
+    if state.jump.variance_m2_s2 > 0.0:
+        r = jump_m_s / math.sqrt(state.jump.variance_m2_s2)
         per_step = math.erfc(math.sqrt(0.5) * r) + math.sqrt(2.0 / math.pi) * r * math.exp(-0.5 * r * r)
     velocity_hz = (len(fixes) - 1) * 1e6 / max(fixes[-1].time_boot_us - fixes[0].time_boot_us, 1)
     return Promise(state.threshold_m_s2, jump_m_s, per_hour + 3600.0 * velocity_hz * per_step)
@@ -136,7 +137,3 @@ def promise_of(
 def alarms_per_h(spreads: float, imu_hz: float) -> float:
     """By sideways noise that a threshold of so many learnt spreads exceeds: exp(-r^2/2) of its samples, by Rayleigh."""
     return 3600.0 * imu_hz * math.exp(-0.5 * (EXCESS * spreads) ** 2)
-
-
-def _ratio(threshold: float, spread: float) -> float:
-    return threshold / spread if spread > 0.0 else math.inf

@@ -72,7 +72,8 @@ class SustainedForceMonitor:
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
         self.imu_count += 1
-        self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
+        (x, y, z), (a, b, c), share = self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count
+        self.measured_frd_m_s2 = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
 
     def step(
         self, sample: LocalPosition, strapdown: Strapdown, goal_ned_m: Vector3 | None, is_free: bool, may_tip: bool
@@ -121,7 +122,11 @@ class SustainedForceMonitor:
         pushes = unit(grown)
         force_m_s2 = min(along(grown, pushes), along(self.missing_m_s2, pushes))
         along_m_s, across = split(self.velocity_m_s, pushes)
-        is_free = _is_free(along_m_s, math.hypot(*across))
+        across_m_s = math.hypot(*across)
+        # One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
+        most_back_m_s = max(reflex.STEADY_M_S, min(across_m_s, 2.0 * reflex.STEADY_M_S))
+        most_on_m_s = max(reflex.STEADY_M_S, min(2.0 * across_m_s, reflex.FREE_M_S))
+        is_free = along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > reflex.FREE_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
@@ -185,13 +190,3 @@ def _beyond(up: Vector3, setpoints: Sequence[Vector3]) -> Vector3:
     amid = shapely.convex_hull(shapely.multipoints(setpoints))
     (a, b), (n, e) = shapely.get_coordinates(shapely.shortest_line(amid, shapely.points(up))).tolist()
     return (n - a, e - b, 0.0)
-
-
-def _is_free(along_m_s: float, across_m_s: float) -> bool:
-    """Whether a vehicle with this velocity along a force, and across it, is not held by a surface.
-
-    One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
-    """
-    most_back_m_s = max(reflex.STEADY_M_S, min(across_m_s, 2.0 * reflex.STEADY_M_S))
-    most_on_m_s = max(reflex.STEADY_M_S, min(2.0 * across_m_s, reflex.FREE_M_S))
-    return along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s

@@ -68,11 +68,10 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     place, velocity, external = belief.position_ned_m, belief.velocity_ned_m_s, belief.external_m_s2
     v_d = velocity[2]
     sides = [(one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - one.off_m(place))) for one in surfaces]
-    for normal, off_m_s in sides:
-        if off_m_s <= 0.0:
-            continue
+    near = [(normal, off_m_s) for normal, off_m_s in sides if off_m_s > 0.0]
+    for normal, off_m_s in near:
         velocity = _certain(velocity, normal, belief.spread_m_s, off_m_s)
-    off = projected(ZERO, [side for side in sides if side[1] > 0.0])
+    off = projected(ZERO, near)
     short, moves = minus(off, velocity), plus(belief.tilt_m_s2, 1.0, external)
     n, e, _ = minus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), moves)
     climbs = reflex.HEIGHT_PER_S2 * (down_m - place[2]) - reflex.CLIMB_PER_S * v_d

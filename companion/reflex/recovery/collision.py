@@ -5,15 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.messages import LocalPosition, Vector3
-from companion.motion.config import LATEST_S
+from companion.motion.config import LATEST_S, SHOWN_US
 from companion.motion.vector import ZERO, along, minus, unit
-from companion.reflex.config import DECIDED_US, FADED_US
+from companion.reflex.config import FADED_US
 from companion.reflex.detection.confirmation import Hypothesis
 from companion.reflex.detection.detector import DetectorState, Phase
 from companion.reflex.detection.impact import ImpactEstimator
 from companion.reflex.recovery.laws import Contact
 from companion.reflex.recovery.motion_estimator import MotionEstimator
-from companion.reflex.surface import Normal, level, with_change
+from companion.reflex.surface import Normal, away_from, with_change
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,8 @@ class CollisionRecord:
         """The obstacle's normal by all that is known now."""
         before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
         error_m_s = math.hypot(self.contact.velocity_error_m_s, estimator.after_error_m_s)
-        return level(with_change(estimator.normal, before_m_s, estimator.after_ned_m_s, error_m_s))
+        normal = with_change(estimator.normal, before_m_s, estimator.after_ned_m_s, error_m_s)
+        return Normal(away_from(normal.direction_ned), normal.error_rad)
 
     def follow(self, state: DetectorState, positions: Sequence[LocalPosition]) -> None:
         """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
@@ -91,7 +92,7 @@ class CollisionRecord:
 
     def is_rejected(self, now_boot_us: int) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
-        if self.hypothesis is None or now_boot_us - self.estimator.hit_boot_us < DECIDED_US:
+        if self.hypothesis is None or now_boot_us - self.estimator.hit_boot_us < SHOWN_US:
             return False
         hypothesis, source, self.hypothesis = self.hypothesis, self.source, None
         return hypothesis.is_rejected(source.strapdown.fixes, source.history, source.config.position_noise_m)

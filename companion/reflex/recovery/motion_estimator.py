@@ -28,7 +28,7 @@ from companion.reflex.correction import error_response
 from companion.reflex.recovery.attitude_law import Belief
 from companion.reflex.recovery.filter_bank import FilterBank
 from companion.reflex.recovery.laws import Contact, MotionState
-from companion.reflex.surface import Normal, level
+from companion.reflex.surface import Normal, away_from
 
 
 @dataclass(slots=True)
@@ -145,7 +145,7 @@ class MotionEstimator:
         if least_m_s2 <= reflex.PRESSES_M_S2:
             return ZERO
         # What pushes off what was hit is that, sooner than wind.
-        normal = level(self.normal).direction_ned
+        normal = away_from(self.normal.direction_ned)
         off_m_s2 = min(along(new, normal), along(all_m_s2, normal))
         return new if least_m_s2 > reflex.HELD_M_S2 or off_m_s2 > reflex.PRESSES_M_S2 else ZERO
 
@@ -284,7 +284,7 @@ class MotionEstimator:
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
-        normal = level(self.normal).direction_ned
+        normal = away_from(self.normal.direction_ned)
         bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
         motion, spread_m_s, self._swings_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
