@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from companion.motion.config import TILT_RAD_PER_M_S
 from companion.reflex import config as reflex
-from companion.reflex.config import APPROACH_M_S, CORRECTED_US, UNCORRECTED_US
 
 Floats = npt.NDArray[np.float64]
 
@@ -73,7 +72,7 @@ class VelocityValidity:
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
-        is_right = self.is_valid or (not self._is_again and time_us - self.hit_boot_us < UNCORRECTED_US)
+        is_right = self.is_valid or (not self._is_again and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
         return 0.0 if is_right else TILT_RAD_PER_M_S * (1.0 + self._speed_m_s)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
@@ -82,7 +81,7 @@ class VelocityValidity:
         What struck a vehicle that stood still may have done so at any speed."""
         if self.is_valid:
             return 0.0
-        if self._speed_m_s < APPROACH_M_S or self.is_disproved:
+        if self._speed_m_s < reflex.APPROACH_M_S or self.is_disproved:
             return self.left_m_s
         *before, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
         swing_m_s = 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
@@ -98,4 +97,4 @@ class VelocityValidity:
         self.is_valid = is_fully_measured and (self.is_valid or not self._is_again)
 
     def update(self, time_us: int) -> None:
-        self.is_valid = self.is_valid or (not self.is_disproved and time_us - self.hit_boot_us > CORRECTED_US)
+        self.is_valid = self.is_valid or (not self.is_disproved and time_us - self.hit_boot_us > reflex.CORRECTED_US)

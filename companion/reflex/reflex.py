@@ -15,7 +15,6 @@ from companion.motion.config import KEPT_US, SettledConfig
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import ZERO, plus
 from companion.reflex import config as numbers
-from companion.reflex.config import RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.crash import CrashWatch
 from companion.reflex.detection.detector import ImpactKind, Situation
@@ -55,7 +54,7 @@ class Reflex:
     """Changed only by its methods."""
 
     config: CollisionMonitorConfig
-    law_config: RecoveryConfig
+    law_config: numbers.RecoveryConfig
     settled: SettledConfig
     monitor: CollisionMonitor = field(init=False)
     hits: list[CollisionRecord] = field(default_factory=list)

@@ -36,7 +36,6 @@ from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, 
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
 from companion.reflex import config as reflex
-from companion.reflex.config import FusedConfig
 from companion.reflex.detection.classify import classified, hovers
 from companion.reflex.detection.detector import (
     ON_THE_GROUND,
@@ -82,7 +81,7 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
-    def side_force(self, config: FusedConfig, sample: ImuSample) -> tuple[float, float, bool]:
+    def side_force(self, config: reflex.FusedConfig, sample: ImuSample) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
 
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
@@ -145,7 +144,7 @@ class FusedDetector:
         MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
     }
 
-    def __init__(self, config: FusedConfig, averaging_interval_us: int) -> None:
+    def __init__(self, config: reflex.FusedConfig, averaging_interval_us: int) -> None:
         self._config = config
         self._averaging_us = averaging_interval_us
 

@@ -23,7 +23,6 @@ class ContactForce:
     range_m_s2: float
     came_ned_m_s: Vector3 = ZERO
     """v_c; zero where it is not known, as in a hit that follows another that clipping hid a part of."""
-    is_over: bool = False
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)
     """The contact force in samples above the threshold."""
@@ -52,8 +51,7 @@ class ContactForce:
             share = min(1.0, first_m_s2 / second_m_s2) if second_m_s2 > 0.0 else 1.0
             self.begun_boot_us = sample.time_boot_us - elapsed_us - round(share * self.averaging_us)
 
-    @property
-    def is_fully_measured(self) -> bool:
+    def is_fully_measured(self, is_over: bool) -> bool:
         """Whether the force so far was measured without clipping, as far as the samples show."""
         if self.is_clipped:
             return False
@@ -64,19 +62,18 @@ class ContactForce:
         off_m_s = along(plus(self.came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
         # One that is over and has not even stopped the vehicle's way into it lacks some: a chattering frame's pulses
         # are short, and each is clipped.
-        return lasting > SHORT and not (self.is_over and off_m_s < -SAME_M_S)
+        return lasting > SHORT and not (is_over and off_m_s < -SAME_M_S)
 
 
 @dataclass(frozen=True, slots=True)
 class ImpactEstimate:
     """One impact. Times are the vehicle's boot clock, vectors local NED, SI.
 
-    `time_boot_us` is t_c, good to `time_error_us` either way; `velocity_ned_m_s` is v_c, the velocity just before
-    it, and `velocity_error_m_s` its standard deviation on an axis. `normal` is the direction out of the
-    obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
-    IMU sample. `is_fully_measured`: nothing was clipped; otherwise the vehicle's own estimate may lack a part of the
-    hit. `is_lower_bound`: it may have been clipped, or samples are missing, and both may be larger. `is_final`: the
-    contact is over. `earlier` is the IMU sample before the first one that shows it.
+    `time_boot_us` is t_c, good to `time_error_us` either way; place and velocity are x(t_c) and v_c, just before it,
+    `velocity_error_m_s` is v_c's standard deviation on an axis. `impulse_m_s` is per unit mass,
+    `peak_specific_force_m_s2` the largest in one IMU sample. `is_fully_measured`: nothing was clipped; otherwise the
+    vehicle's own estimate may lack a part of the hit. `is_lower_bound`: it may have been clipped, or samples are
+    missing, and both may be larger. `earlier` is the IMU sample before the first one that shows it.
     """
 
     impact: Impact
@@ -126,7 +123,12 @@ class ImpactEstimator(Motion):
     def begin(self, impact: Impact) -> ImpactEstimate:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
         sample_us, free_until_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
-        place, velocity, error_m_s = self._motion(free_until_us)
+        place, velocity, error_m_s = ZERO, ZERO, math.inf
+        # What comes later may lack a part of the hit: after a stiff contact PX4's estimate is not valid.
+        latest = self.history.before(free_until_us - STAMP_RESOLUTION_US)
+        if latest is not None:
+            velocity, error_m_s = latest.velocity_ned_m_s, self.config.velocity_noise_m_s
+            place = plus(latest.position_ned_m, 1e-6 * (free_until_us - latest.time_boot_us), velocity)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
         came = velocity if self.validity.is_valid else ZERO
@@ -180,21 +182,8 @@ class ImpactEstimator(Motion):
             )
         if contact is not None:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-            contact.is_over = is_over
-            is_whole = contact.is_fully_measured
+            is_whole = contact.is_fully_measured(is_over)
             self.validity.assess(is_whole)
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
-
-    def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
-        """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.
-
-        What comes later may lack a part of the hit: after a stiff contact PX4's estimate is not valid.
-        """
-        latest = self.history.before(contact_us - STAMP_RESOLUTION_US)
-        if latest is None:
-            return ZERO, ZERO, math.inf
-        ahead_s = 1e-6 * (contact_us - latest.time_boot_us)
-        place = plus(latest.position_ned_m, ahead_s, latest.velocity_ned_m_s)
-        return place, latest.velocity_ned_m_s, self.config.velocity_noise_m_s

@@ -1,7 +1,5 @@
-"""The collision monitor joins the detector, the impact estimate and the stream health.
-
-It is pure, and the same in flight, replay and bench. A `CollisionMonitor` is changed only by `advance`: the same
-samples at the same times give the same impacts and notices.
+"""The collision monitor joins the detector, the impact estimate and the stream health. It is pure, and the same in
+flight, replay and bench.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -61,7 +59,7 @@ class Notice:
 
 @dataclass(slots=True)
 class CollisionMonitor:
-    """The monitor's state between two steps. It can be copied and pickled as a whole."""
+    """The state between two steps, changed only by `advance`. It can be copied and pickled as a whole."""
 
     config: CollisionMonitorConfig
     detector: Detector
@@ -123,9 +121,8 @@ def advance(
             imu_samples += 1
             if 0 <= estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
                 continue
-        elif type(sample) is Attitude:
-            if not monitor.gate.attitude(sample):
-                continue
+        elif type(sample) is Attitude and not monitor.gate.attitude(sample):
+            continue
         elif type(sample) is Refused:
             if sample.message == MessageId.HIGHRES_IMU.name:
                 monitor.imu_fault = f"HIGHRES_IMU not accepted: {sample.reason}"

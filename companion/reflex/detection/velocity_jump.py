@@ -15,7 +15,6 @@ from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, plus
 from companion.reflex import config as reflex
-from companion.reflex.config import FusedConfig
 
 
 @dataclass(slots=True)
@@ -57,7 +56,7 @@ class VelocityJump:
         self.known = min(self.known + 1, MEMORY)
         self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
 
-    def least_m_s(self, config: FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:
+    def least_m_s(self, config: reflex.FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
 
         It is `noise_factor` spreads, and more after few steps, by Student's t (its quantile, expanded in 1 / degrees of

@@ -1,14 +1,12 @@
 """Position and velocity of a vehicle after a hit, although its own estimate may lack a part of the hit.
 
-A clipped accelerometer hides a part of the impulse. That part is missing in the vehicle's own velocity estimate, and
-then in its position. Its estimator corrects both by other sensors. So at a time t after the hit the vehicle reports
+A clipped accelerometer hides a part of the impulse. At a time t after the hit the vehicle reports
 
     v(t) + e g(t),    x(t) + e G(t)
 
-for its velocity v and position x, where e is the error just after the hit. Between two reports the accelerometer is
-integrated; a Kalman filter estimates x, v and e on each axis. Delay and speed of the correction differ between
-estimators. A bank of filters has one hypothesis each, one of them e = 0; each is weighted by the likelihood of its
-innovations (Magill 1965). Before the first report v is the expected rebound, with a wide standard deviation.
+for its velocity v and position x, where e is the error just after the hit (see `correction`). Between two reports the
+accelerometer is integrated. A bank of Kalman filters estimates x, v and e, each by one hypothesis of g and G, and
+weighted by the likelihood of its innovations (Magill 1965). Before the first report v is the expected rebound.
 """
 
 import math
@@ -23,7 +21,6 @@ from companion.motion.settling import Lasting
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
-from companion.reflex.config import EstimateConfig
 from companion.reflex.correction import error_response
 from companion.reflex.recovery.attitude_law import Belief
 from companion.reflex.recovery.filter_bank import FilterBank
@@ -38,7 +35,7 @@ class MotionEstimator:
     contact: Contact
     hit_boot_us: int  # its first sample
     start: MotionState  # the expected motion after it
-    config: EstimateConfig
+    config: reflex.EstimateConfig
     is_second: bool = False  # the error of an earlier hit was still being corrected
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
     known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it

@@ -13,7 +13,6 @@ from companion.motion.config import SettledConfig
 from companion.motion.settling import Lasting, SettlingMonitor
 from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex import config as reflex
-from companion.reflex.config import RecoveryConfig
 from companion.reflex.recovery.attitude_law import brakable_m_s
 from companion.reflex.recovery.collision import CollisionRecord
 from companion.reflex.recovery.laws import Contact, Law, MotionState
@@ -52,7 +51,7 @@ class Recovery:
         self,
         record: CollisionRecord,
         law: Law,
-        config: RecoveryConfig,
+        config: reflex.RecoveryConfig,
         settled: SettledConfig,
         room: Room,
         earlier: Sequence[Surface],
