@@ -81,33 +81,40 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
+    def side_threshold_m_s2(self, config: reflex.FusedConfig, rates_frd_rad_s: Vector3) -> float:
+        """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
+        (p, q, r), speed_m_s = rates_frd_rad_s, math.hypot(*self.velocity_ned_m_s or ZERO)
+        turning_rad_s = abs(p) + abs(q) + abs(r)
+        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
+
     def side_force(self, config: reflex.FusedConfig, sample: ImuSample) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
 
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        (p, q, r), (f_x, f_y, _) = sample.angular_velocity_frd_rad_s, sample.specific_force_frd_m_s2
-        speed_m_s, turning_rad_s = math.hypot(*self.velocity_ned_m_s or ZERO), abs(p) + abs(q) + abs(r)
-        # On a turning vehicle drag changes direction faster than its mean follows.
-        drag_m_s2 = config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
-        (m_x, m_y, _), limit = self.floor.mean_frd_m_s2, self.threshold_m_s2 + drag_m_s2
-        alone = math.dist((f_x, f_y), (m_x, m_y))
+        force, mean = sample.specific_force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2]
+        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config, sample.angular_velocity_frd_rad_s)
         if self.phase is not Phase.ARMED:
             return alone, limit, False
-        if math.hypot(m_x, m_y) > config.side_threshold_m_s2:
+        if math.hypot(*mean) > config.side_threshold_m_s2:
             # The mean is a push, whose end is no hit.
-            alone = min(alone, math.hypot(f_x, f_y))
+            alone = min(alone, math.hypot(*force))
         if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, limit, False
-        # Two count as one: their sum over the root of two, by which the noise of a sum grows. Vibration alternates, a
-        # contact does not. Compared with zero, too: a slow swing that the mean has not followed is none.
-        x, y = f_x + self.last_frd_m_s2[0], f_y + self.last_frd_m_s2[1]
-        together = math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
-        of_two = self.before_threshold_m_s2 / self.threshold_m_s2
+        together, of_two = self._together_m_s2(sample), self.before_threshold_m_s2 / self.threshold_m_s2
         if together / of_two > alone / reflex.CLEAR:
             return together, of_two * limit, True
         return alone, reflex.CLEAR * limit, False
+
+    def _together_m_s2(self, sample: ImuSample) -> float:
+        """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
+        noise of a sum grows. Vibration alternates, a contact does not.
+
+        Compared with zero, too: a slow swing that the mean has not followed is none.
+        """
+        (m_x, m_y, _), both = self.floor.mean_frd_m_s2, plus(sample.specific_force_frd_m_s2, 1.0, self.last_frd_m_s2)
+        return math.sqrt(0.5) * min(math.hypot(both[0] - 2.0 * m_x, both[1] - 2.0 * m_y), math.hypot(*both[:2]))
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large

@@ -332,14 +332,7 @@ class MotionEstimator:
             elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
             if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
-                # Errors of positions are shorter than those of velocities: what these lead further is an error.
-                half_s = 0.5 * elapsed_s
-                led = plus(
-                    plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s
-                )
-                further_m = minus(led, measured.position_ned_m)
-                error = plus(self._rate_error_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m)
-                self._rate_error_m_s = limited(error, 2.0 * SAME_M_S)
+                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
         place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
         if not self.is_measured_apart:
             velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
@@ -356,3 +349,14 @@ class MotionEstimator:
         place = minus(sample.position_ned_m, self.position_error_m)
         velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
         return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
+
+
+def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
+    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
+
+    The errors of positions are shorter than those of velocities. The reports are without the error so far.
+    """
+    half_s = 0.5 * elapsed_s
+    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
+    further_m = minus(led, measured.position_ned_m)
+    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
