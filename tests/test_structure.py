@@ -98,7 +98,7 @@ def test_companion_and_vehicle_never_import_each_other_nor_the_command_line() ->
 
 def test_how_the_reflex_decides_and_believes_stays_behind_its_door() -> None:
     # Values go through the door, and settings; to compare with other detectors the laboratory looks behind it.
-    behind = ("classify", "confirmation", "crash", "free_flight", "fused", "sustained_force", "velocity_jump")
+    behind = ("classify", "confirmation", "crash", "free_flight", "fused", "jumps", "sustained_force")
     hidden = {f"companion.reflex.detection.{name}" for name in behind}
     hidden |= {"companion.reflex.correction", "companion.reflex.recovery.motion_estimator"}
     found = [
@@ -235,7 +235,7 @@ CONFIGS = [COMPANION / "reflex" / "config.py", COMPANION / "motion" / "config.py
 FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 # Those that a derivation gives.
 DERIVED = {
-    "reflex/detection/velocity_jump.py": {3},  # axes; Student's t by degrees of freedom
+    "reflex/detection/jumps.py": {3},  # axes; Student's t by degrees of freedom
     "reflex/recovery/filter_bank.py": {3},  # axes
     "reflex/detection/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/detection/monitor.py": {3},  # shown decimals

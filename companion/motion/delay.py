@@ -13,13 +13,10 @@ from companion.motion.config import DELAY_S, LATEST_S
 
 @dataclass(slots=True)
 class Delay:
-    """Changed only by `learn`. Velocities in m/s, accelerations in m/s^2, local NED.
+    """Changed only by `learn`. Velocities in m/s, accelerations in m/s^2, local NED."""
 
-    Before the flight its mean is known, its standard deviation, and the longest.
-    """
-
-    expected_s: float = DELAY_S
-    spread_s: float = DELAY_S
+    expected_s: float = DELAY_S  # before the flight
+    spread_s: float = DELAY_S  # its standard deviation
     longest_s: float = LATEST_S
     repeats: float = 1.0  # so many steps have the same noise
     _against: float = 0.0

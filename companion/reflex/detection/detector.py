@@ -129,10 +129,6 @@ class Innovation:
     value: float = 0.0
     limit: float = math.inf
 
-    @property
-    def ratio(self) -> float:
-        return self.value / self.limit
-
 
 @dataclass(slots=True)
 class DetectorState:

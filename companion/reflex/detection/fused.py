@@ -6,8 +6,7 @@ contact, each compared with this vehicle's own flight:
 * horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
 * vertical: f_z is outside the range of the propellers, from zero to their maximum (see `free_flight`). A failed motor,
   free fall, a dropped payload and every manoeuvre stay inside;
-* the body rates jump, and stay (see `rate_jump`);
-* the velocity jumps and the accelerometer does not show it (see `velocity_jump`).
+* the body rates jump, and stay, or the velocity jumps and the accelerometer does not show it (see `jumps`).
 
 Both jumps follow a contact of which the samples hold a part at most: two signs below their limits add up, by squares.
 
@@ -49,8 +48,7 @@ from companion.reflex.detection.detector import (
     Situation,
 )
 from companion.reflex.detection.free_flight import ForceNoise
-from companion.reflex.detection.rate_jump import RateJump
-from companion.reflex.detection.velocity_jump import VelocityJump
+from companion.reflex.detection.jumps import RateJump, VelocityJump
 
 
 @dataclass(slots=True)
@@ -135,11 +133,6 @@ class FusedState(DetectorState):
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
         is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < reflex.APPROACH_M_S
         return is_slow and self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
-
-    def jumps(self, force_frd_m_s2: Vector3) -> bool:
-        """Whether the force changed over one sample, or over two, by more than a hand's does."""
-        least_m_s2 = reflex.JUMP * self.threshold_m_s2
-        return any(math.dist(force_frd_m_s2, f) >= least_m_s2 for f in (self.last_frd_m_s2, self.before_frd_m_s2))
 
 
 class FusedDetector:
@@ -226,7 +219,7 @@ class FusedDetector:
             s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
-        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.ratio)
+        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
         impact = Impact(
             now_us,
             free_until_us,
@@ -272,7 +265,10 @@ class FusedDetector:
             return None
         first = s.observed = s.observed or impact
         impact = replace(impact, contact_free_until_boot_us=first.contact_free_until_boot_us)
-        if size < self._config.soft_m_s2 and s.may_be_hand(now_us) and not s.jumps(f):
+        # A hand's force changes by less, over one sample or two.
+        jumped_m_s2 = max(math.dist(f, s.last_frd_m_s2), math.dist(f, s.before_frd_m_s2))
+        is_weak = size < self._config.soft_m_s2 and jumped_m_s2 < reflex.JUMP * s.threshold_m_s2
+        if is_weak and s.may_be_hand(now_us):
             if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             impact = replace(impact, kind=ImpactKind.CONTACT)
@@ -315,7 +311,7 @@ class FusedDetector:
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
         corrected_m_s = motion.validity.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
-        ratio = s.velocity.ratio
+        ratio = s.velocity.value / s.velocity.limit
         # What is not of one moment adds to a jump, and not to each other.
         other = max(s.turn.shown, s.force[0], s.force_before[0])
         is_weak = ratio <= 1.0 < math.hypot(ratio, other) and not s.may_be_hand(time_us)

@@ -47,11 +47,9 @@ class SampleGate:
     """Rejects what the vehicle cannot have measured: an IMU stuck at one value, and an attitude out of reach.
 
     Stuck: all six axes are equal to the last bit, and the attitude is not. Noise alone changes the last bits of real
-    measurements; at rest a simulated sensor without noise may repeat itself.
-
-    An attitude is out of reach if the vehicle cannot have turned to it since the last. A second one that agrees with a
-    rejected one is accepted, as after a reset of the estimator. So one forged or broken message does not disturb the
-    integrated accelerometer.
+    measurements; at rest a simulated sensor without noise may repeat itself. An attitude is out of reach if the vehicle
+    cannot have turned to it since the last. One forged or broken one is rejected, and a second one that agrees with it
+    accepted, as after a reset of the estimator.
     """
 
     latest: Attitude | None = None

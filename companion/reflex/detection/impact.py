@@ -17,18 +17,15 @@ from companion.reflex.surface import Normal, normal_of
 class ContactForce:
     """Changed only by `add`. Forces per unit mass, m/s^2; impulse per unit mass, m/s."""
 
-    free_frd_m_s2: Vector3
-    """The accelerometer's value without the contact."""
+    free_frd_m_s2: Vector3  # the accelerometer's value without the contact
     averaging_us: int
     range_m_s2: float
     came_ned_m_s: Vector3 = ZERO
     """v_c; zero where it is not known, as in a hit that follows another that clipping hid a part of."""
     impulse_ned_m_s: Vector3 = ZERO
-    forces_ned_m_s2: list[Vector3] = field(default_factory=list)
-    """The contact force in samples above the threshold."""
+    forces_ned_m_s2: list[Vector3] = field(default_factory=list)  # in samples above the threshold
     is_clipped: bool = False
-    has_gap: bool = False
-    """Whether samples are missing; PX4's own estimate does not lack them."""
+    has_gap: bool = False  # whether samples are missing; PX4's own estimate does not lack them
     begun_boot_us: int | None = None
 
     def add(self, sample: ImuSample, elapsed_us: int, attitude_wxyz: Quaternion) -> None:

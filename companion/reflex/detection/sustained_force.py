@@ -14,7 +14,6 @@ direction.
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import shapely
@@ -155,7 +154,11 @@ class SustainedForceMonitor:
         # After a silence or a reset the two do not compare.
         if not fixes or now_us - fixes[0].time_boot_us < reflex.FOLLOWS_US:
             return None
-        error = _beyond(body_to_ned(strapdown.attitude_wxyz, _UP_FRD), [each for _, each in setpoints])
+        # From what lies between the setpoints to the thrust's direction; zero for one amid them.
+        amid = shapely.convex_hull(shapely.multipoints([each for _, each in setpoints]))
+        up = shapely.points(body_to_ned(strapdown.attitude_wxyz, _UP_FRD))
+        (from_n, from_e), (to_n, to_e) = shapely.get_coordinates(shapely.shortest_line(amid, up)).tolist()
+        error = (to_n - from_n, to_e - from_e, 0.0)
         beyond, leant = math.hypot(*error), unit(error)
         limit = max(reflex.LEAN_ERROR, GATE * math.sqrt(self.error_variance))
         elapsed_s, self.error_us = 1e-6 * min(since_us, reflex.FOLLOWS_US), now_us
@@ -183,10 +186,3 @@ class SustainedForceMonitor:
         if is_first:
             self.wind_m_s2 = self.missing_m_s2
         return elapsed_s
-
-
-def _beyond(up: Vector3, setpoints: Sequence[Vector3]) -> Vector3:
-    """From what lies between the setpoints to the thrust's direction, north and east; zero for one amid them."""
-    amid = shapely.convex_hull(shapely.multipoints(setpoints))
-    (a, b), (n, e) = shapely.get_coordinates(shapely.shortest_line(amid, shapely.points(up))).tolist()
-    return (n - a, e - b, 0.0)

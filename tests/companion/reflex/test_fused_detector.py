@@ -18,7 +18,7 @@ from companion.reflex.detection.free_flight import ForceNoise
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
 from companion.reflex.detection.impact import ImpactEstimator
-from companion.reflex.detection.rate_jump import RateJump
+from companion.reflex.detection.jumps import RateJump
 
 TICK_US = 1_000
 WINDOW_US = 4_000
