@@ -10,7 +10,7 @@ import numpy as np
 from bench.cases.hits import HEIGHT_M, POLE_OFFSET_SHARES, Floats, HitCase, obstacle_before, velocity_towards
 from companion.link.streams import wanted_streams
 from companion.mavlink.decode import Decoder
-from companion.messages import LandedState, MessageId, Sample
+from companion.messages import MessageId, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.impact import ImpactEstimate
@@ -132,7 +132,7 @@ def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET
         contact_m_s2[now_us] = contact.added_n_s(hit_row) / (airframe.mass_kg * interval_s)
         off_reason, height_m = "takeoff" if now_us < 1e6 * SWITCHED_ON_AFTER_S else None, -float(vehicle.state.body[2])
         asked_ned_m = vector(START_NED_M + 1e-6 * now_us * velocity)
-        situation = Situation(off_reason, True, LandedState.IN_AIR, height_m, setpoint_position_ned_m=asked_ned_m)
+        situation = Situation(off_reason, True, False, height_m, setpoint_position_ned_m=asked_ned_m)
         for rate, (link, decoder) in ears.items():
             samples = tuple(sample for _, sample in decoder.feed(b"".join(link.take())) if sample is not None)
             if samples:

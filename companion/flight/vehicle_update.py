@@ -155,9 +155,7 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, 
     A held vehicle that has climbed, and is not sent down, has not landed: the report may be forged, and a detector is
     off on the ground.
     """
-    landed, place, target = flight.vehicle.landed, None, flight.target
-    if is_held and flight.has_climbed and not goes_down and landed is messages.LandedState.ON_GROUND:
-        landed = messages.LandedState.UNDEFINED
+    is_aloft, place, target = is_held and flight.has_climbed and not goes_down, None, flight.target
     if is_held and target is not None and target.lean is None:
         place = target.position_ned_m
     height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
@@ -167,7 +165,7 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, 
     return Situation(
         off_reason=off_state,
         may_crash=flight.may_crash,
-        landed_state=landed,
+        is_on_ground=flight.vehicle.landed is messages.LandedState.ON_GROUND and not is_aloft,
         height_m=height_m,
         descent_commanded=goes_down,
         setpoint_position_ned_m=place,

@@ -28,11 +28,7 @@ class Doppler:
     late_s: float = 0.0  # carried on by so much
     variance_m2_s2: float = numbers.DOPPLER_M_S**2
     known: int = 1
-    delay: Delay = field(
-        default_factory=lambda: Delay(
-            numbers.RECEIVER_DELAY_S, numbers.RECEIVER_SPREAD_S, numbers.RECEIVER_LATEST_S, numbers.RECEIVER_REPEATS
-        )
-    )
+    delay: Delay = field(default_factory=lambda: Delay(*numbers.RECEIVER_DELAY_S, numbers.RECEIVER_REPEATS))
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
     _first: GpsFix | None = None  # where its places are counted from
     _off_m: Vector3 | None = None  # the vehicle's own place less the receiver's
@@ -68,12 +64,13 @@ class Doppler:
         )
 
     def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
-        faster = _faster_by(strapdown, numbers.RECEIVER_DELAY_S)
+        usual_s = self.delay.expected_s
+        faster = _faster_by(strapdown, usual_s)
         if faster is None:
             return
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.sum_ned_m_s)
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
-        change = plus(ZERO, 1.0 / numbers.RECEIVER_DELAY_S, faster)
+        change = plus(ZERO, 1.0 / usual_s, faster)
         most_m_s = numbers.GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
         if math.hypot(*plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change)) < most_m_s:

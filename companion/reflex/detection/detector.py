@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol
 
-from companion.messages import LandedState, MessageId, Sample, Vector3
+from companion.messages import MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
 from companion.reflex.correction import VelocityValidity
@@ -48,26 +48,18 @@ class Evidence(Enum):
 
 
 class Situation(NamedTuple):
-    """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
+    """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step."""
 
-    `off_reason` says why no hit may be reported now, but for a crash. `may_crash`: the vehicle is known to fly, or did
-    a moment ago, be it unwatched. `height_m` is above the place of arming; `has_climbed`: the vehicle has been higher
-    than a take-off reaches since it stood on the ground or touched it. The setpoint is the place last sent, local NED,
-    where one is flown to. `descent_commanded`: the vehicle goes down because it was told to, or by the hand that flies
-    it, so that touching the ground is no surprise. `flown_by_hand`: by a pilot's sticks. `has_position`: one came of
-    late. `is_wreck`: it has crashed and not flown since; that it bounces and is picked up is not told.
-    """
-
-    off_reason: str | None = None
-    may_crash: bool = False
-    landed_state: LandedState = LandedState.UNDEFINED
-    height_m: float | None = None
-    descent_commanded: bool = False
-    setpoint_position_ned_m: Vector3 | None = None
-    flown_by_hand: bool = False
-    has_climbed: bool = True
-    has_position: bool = True
-    is_wreck: bool = False
+    off_reason: str | None = None  # why no hit may be reported now, but for a crash
+    may_crash: bool = False  # it is known to fly, or did a moment ago, be it unwatched
+    is_on_ground: bool = False  # as the vehicle says
+    height_m: float | None = None  # above the place of arming
+    descent_commanded: bool = False  # or by the hand that flies it: touching the ground is no surprise
+    setpoint_position_ned_m: Vector3 | None = None  # the place last sent, local NED, where one is flown to
+    flown_by_hand: bool = False  # by a pilot's sticks
+    has_climbed: bool = True  # higher than a take-off reaches, since it stood on the ground or touched it
+    has_position: bool = True  # one came of late
+    is_wreck: bool = False  # it has crashed and not flown since; that it bounces and is picked up is not told
 
 
 @dataclass(slots=True)
@@ -84,24 +76,20 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """A hit, on the first sample that shows it.
-
-    `contact_free_until_boot_us` is the latest time at which the vehicle was certainly still free: the start of
-    the sample's averaging window, or the previous sample where the stream left a gap before it.
-    `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes; where only the aftermath
-    was seen, the mean over the gap that the contact must have fallen into.
-    `confidence` is the detector's own, 0 to 1. `is_shown_twice`: by more than one message. `free_frd_m_s2`: of
-    a contact that its force has not shown and may show yet, what the accelerometer shows without it.
-    """
+    """A hit, on the first sample that shows it."""
 
     sample_time_boot_us: int
     contact_free_until_boot_us: int
+    """The latest time at which the vehicle was certainly still free: the start of the sample's averaging window, or the
+    previous sample where the stream left a gap before it."""
     specific_force_frd_m_s2: Vector3
+    """What the contact alone did to the vehicle, in body axes; where only the aftermath was seen, the mean over the gap
+    that the contact must have fallen into."""
     kind: ImpactKind = ImpactKind.UNKNOWN
     evidence: Evidence = Evidence.FORCE
-    confidence: float = 1.0
-    is_shown_twice: bool = False
-    free_frd_m_s2: Vector3 | None = None
+    confidence: float = 1.0  # the detector's own, 0 to 1
+    is_shown_twice: bool = False  # by more than one message
+    free_frd_m_s2: Vector3 | None = None  # what the accelerometer shows without a contact whose force may show yet
 
     @property
     def size_m_s2(self) -> float:
@@ -132,20 +120,15 @@ class Innovation:
 
 @dataclass(slots=True)
 class DetectorState:
-    """What every detector's state shows; a detector that remembers more extends it.
-
-    `threshold_m_s2` is what a sample must reach now. The two before it describe the present contact, or the
-    latest one: time of its last loud sample, and the largest contact force per unit mass in one sample so far. `thrust`
-    is learnt in free air.
-    """
+    """What every detector's state shows; a detector that remembers more extends it."""
 
     phase: Phase = Phase.OFF
     off_reason: str = "not started"
     last_sample_boot_us: int = 0
-    last_loud_boot_us: int = 0
-    peak_specific_force_m_s2: float = 0.0
-    threshold_m_s2: float = 0.0
-    thrust: ThrustGain = field(default_factory=ThrustGain)
+    last_loud_boot_us: int = 0  # of the present contact, or the latest one
+    peak_specific_force_m_s2: float = 0.0  # of that contact, per unit mass, the largest in one sample so far
+    threshold_m_s2: float = 0.0  # what a sample must reach now
+    thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
 
 
 class Detector(Protocol):

@@ -21,16 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from companion.messages import (
-    AttitudeTarget,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    MessageId,
-    Odometry,
-    Sample,
-    Vector3,
-)
+from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
@@ -169,7 +160,7 @@ class FusedDetector:
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
         config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
         off = situation.off_reason
-        if off is None and situation.landed_state is LandedState.ON_GROUND:
+        if off is None and situation.is_on_ground:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us

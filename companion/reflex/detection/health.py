@@ -87,16 +87,11 @@ class SampleGate:
 
 
 class Promise(NamedTuple):
-    """Of Gaussian noise as it was learnt in this flight; a false alarm by anything else, or by two signs
-    together, is not in it.
+    """From where on a hit shows, and how often noise does, if that is Gaussian as it was learnt in this flight."""
 
-    A hit shows from `force_m_s2` on in a sample that holds it, and from `jump_m_s` on where it falls between the
-    samples: infinite before velocities are known.
-    """
-
-    force_m_s2: float
-    jump_m_s: float
-    false_alarms_per_h: float
+    force_m_s2: float  # in a sample that holds it
+    jump_m_s: float  # where it falls between the samples; infinite before velocities are known
+    false_alarms_per_h: float  # without those by two signs together
 
     def text(self) -> str:
         jump = f" or {self.jump_m_s:.2f} m/s" if math.isfinite(self.jump_m_s) else ""

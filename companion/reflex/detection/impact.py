@@ -64,28 +64,21 @@ class ContactForce:
 
 @dataclass(frozen=True, slots=True)
 class ImpactEstimate:
-    """One impact. Times are the vehicle's boot clock, vectors local NED, SI.
-
-    `time_boot_us` is t_c, good to `time_error_us` either way; place and velocity are x(t_c) and v_c, just before it,
-    `velocity_error_m_s` is v_c's standard deviation on an axis. `impulse_m_s` is per unit mass,
-    `peak_specific_force_m_s2` the largest in one IMU sample. `is_fully_measured`: nothing was clipped; otherwise the
-    vehicle's own estimate may lack a part of the hit. `is_lower_bound`: it may have been clipped, or samples are
-    missing, and both may be larger. `earlier` is the IMU sample before the first one that shows it.
-    """
+    """One impact. Times are the vehicle's boot clock, vectors local NED, SI."""
 
     impact: Impact
-    time_boot_us: int
-    time_error_us: int
-    position_ned_m: Vector3
-    velocity_ned_m_s: Vector3
+    time_boot_us: int  # t_c
+    time_error_us: int  # either way
+    position_ned_m: Vector3  # x(t_c)
+    velocity_ned_m_s: Vector3  # v_c: just before the contact
     normal: Normal
-    peak_specific_force_m_s2: float
-    impulse_m_s: float
-    velocity_error_m_s: float = 0.0
-    is_fully_measured: bool = False
-    is_lower_bound: bool = True
-    is_final: bool = False
-    earlier: ImuSample | None = None
+    peak_specific_force_m_s2: float  # the largest in one IMU sample
+    impulse_m_s: float  # of the contact, per unit mass
+    velocity_error_m_s: float = 0.0  # standard deviation on an axis
+    is_fully_measured: bool = False  # nothing was clipped; else the vehicle's own estimate may lack a part of the hit
+    is_lower_bound: bool = True  # peak and impulse may be larger: something was clipped, or samples are missing
+    is_final: bool = False  # the contact is over
+    earlier: ImuSample | None = None  # the one before the first that shows it
 
 
 @dataclass(slots=True)

@@ -18,29 +18,22 @@ from companion.reflex.surface import Normal, away_from, with_change
 
 @dataclass(frozen=True, slots=True)
 class CollisionReport:
-    """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED.
-
-    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact. `normal_ned` is the horizontal unit
-    direction of the obstacle's push, taken over the whole contact. `peak_specific_force_m_s2` is the largest specific
-    force perpendicular to thrust in one IMU sample. `settled_after_s` runs from the detection to the start of the
-    interval in which the vehicle stayed settled; None when it did not settle. `overshoot_m` is the largest distance
-    past the setpoint, away from the obstacle, until the recovery ended. `rebound_speed_m_s` is the largest speed along
-    the normal until 0.1 s after the contact; 0 when it never moved back, None when the vehicle's velocity was not
-    valid then (a clipped hit).
-    """
+    """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED."""
 
     detected_at_us: int
     sample_time_boot_us: int
     detector: str
     position_ned_m: Vector3
-    impact_velocity_ned_m_s: Vector3
+    impact_velocity_ned_m_s: Vector3  # v_c of the paper: just before contact
     impact_speed_m_s: float
-    normal_ned: Vector3
-    peak_specific_force_m_s2: float
+    normal_ned: Vector3  # unit vector out of the obstacle, by the whole contact; horizontal unless that is steep
+    peak_specific_force_m_s2: float  # of the contact alone, the largest in one IMU sample
     recovery_setpoint_ned_m: Vector3
-    settled_after_s: float | None
-    overshoot_m: float
+    settled_after_s: float | None  # from the hit to the start of the interval in which it stayed settled; None: not
+    overshoot_m: float  # largest distance past the setpoint, away from the obstacle, until the recovery ended
     rebound_speed_m_s: float | None
+    """Largest speed along the normal until 0.1 s after the contact; 0 when it never moved back, None when the vehicle's
+    velocity was not valid then (a clipped hit)."""
 
 
 @dataclass(slots=True)

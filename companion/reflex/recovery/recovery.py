@@ -32,16 +32,12 @@ class Room(Protocol):
 
 
 class Progress(NamedTuple):
-    """What one position has shown, each None where it has not: seconds since the hit, and a speed off the obstacle.
+    """What one position has shown, each None where it has not: seconds since the hit, and a speed off the obstacle."""
 
-    `is_rejected`: the hit was none, as nothing but its first message shows it. `rested_s`: it rests, and is flown by a
-    position from now on. `rebound_m_s`: the goal has moved. `settled_s`: the recovery is over.
-    """
-
-    is_rejected: bool
-    rested_s: float | None
-    rebound_m_s: float | None
-    settled_s: float | None
+    is_rejected: bool  # the hit was none, as nothing but its first message shows it
+    rested_s: float | None  # it rests, and is flown by a position from now on
+    rebound_m_s: float | None  # the goal has moved
+    settled_s: float | None  # the recovery is over
 
 
 class Recovery:

@@ -25,7 +25,7 @@ from companion.reflex.detection.monitor import advance, start_monitor
 from companion.reflex.reflex import Reflex
 
 STILL = (0.0, 0.0, 0.0)
-IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=3.0)
+IN_FLIGHT = Situation(may_crash=True, height_m=3.0)
 # Noise by a hair's breadth: velocities that stand still to the last digit are no estimate.
 HAIR_M_S = 1e-3
 INTERVAL_US = 4_000

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Odometry
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import EXCESS, EstimateConfig, FusedConfig
@@ -24,7 +24,7 @@ TICK_US = 1_000
 WINDOW_US = 4_000
 GRAVITY = 9.81
 HOVER_FRACTION = 0.35
-IN_FLIGHT = Situation(may_crash=True, landed_state=LandedState.IN_AIR, height_m=5.0)
+IN_FLIGHT = Situation(may_crash=True, height_m=5.0)
 HIT_US = 3_001_000
 
 

@@ -144,7 +144,7 @@ def test_a_hit_is_found_with_what_was_known_then():
     assert HIT_US < finding.at_us <= HIT_US + 4000
     assert finding.is_collision and finding.threshold_m_s2 == 4.0
     assert finding.first.velocity_ned_m_s[0] == pytest.approx(1.0, abs=0.05)
-    assert finding.situation == Situation(None, True, LandedState.IN_AIR, 1.5, False, None)
+    assert finding.situation == Situation(None, True, False, 1.5, False, None)
     # And what was known when the contact was over
     assert finding.final.is_final and not finding.first.is_final
     assert finding.final.peak_specific_force_m_s2 == pytest.approx(40.0, abs=1.5)
