@@ -192,9 +192,7 @@ class Reflex:
         self.crash.update(samples, height_m, landed)
 
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:
-        """The errors that the newest hit has left in the vehicle's estimate and tilt, and what its integrators have
-        forgotten while it was flown by attitude.
-        """
+        """Left by the newest hit, and by flying by attitude, in which the vehicle's integrators forget what pushes."""
         newest, share = self.newest, self._left_share(time_boot_us)
         if newest is None or share <= 0.0 or not self.law.leans:
             return None

@@ -17,7 +17,7 @@ from companion.messages import Vector3
 from companion.motion.config import LONGEST_GAP_US, MEMORY, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
-from companion.motion.vector import ZERO, along, plus
+from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex import config as reflex
 from companion.reflex.detection.detector import Innovation
 
@@ -101,7 +101,8 @@ class VelocityJump:
         step = _newest_less_mean(fix.less_sum_m_s for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
         pairs = zip(pairwise(recent), apart_us, strict=True)
-        change = _newest_less_mean(_rate(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
+        flown = ((minus(b.sum_ned_m_s, a.sum_ned_m_s), 1e-6 * us) for (a, b), us in pairs)
+        change = _newest_less_mean((n / over_s, e / over_s, d / over_s) for (n, e, d), over_s in flown)
         self.newest, self.compared_us = (step, change), times[1:]
         return plus(step, self.delay.found_s(self.variance_m2_s2)[0], change)
 
@@ -127,10 +128,6 @@ class VelocityJump:
         unseen_share = max(0.0, 1.0 - self.averaging_us / max(apart_us, 1))
         unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         return caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s
-
-
-def _rate(a: Vector3, b: Vector3, seconds: float) -> Vector3:
-    return ((a[0] - b[0]) / seconds, (a[1] - b[1]) / seconds, (a[2] - b[2]) / seconds)
 
 
 def _newest_less_mean(vectors: Iterable[Vector3]) -> Vector3:

@@ -51,12 +51,11 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """`follows`: the goal is found anew as more is known of the contact. `leans`: attitude and thrust are set until the
-    vehicle rests, clear of what it hit; else its own loops fly it to the law's goal from the first moment on."""
+    """A goal, and how the vehicle comes there."""
 
     goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState], Vector3]
-    follows: bool
-    leans: bool
+    follows: bool  # it is found anew as more is known of the contact
+    leans: bool  # attitude and thrust are set until the vehicle rests, clear of what it hit; else its own loops fly it
 
 
 def _paper(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
