@@ -38,14 +38,14 @@ class Doppler:
         out."""
         if is_free:
             self._learn(sample, strapdown)
-        late_s, error_s = self.delay.found_s(self.variance_m2_s2)
-        faster, self.late_s = _faster_by(strapdown, late_s), late_s
+        self.late_s, error_s = self.delay.found_s(self.variance_m2_s2)
+        faster = _faster_by(strapdown, self.late_s)
         if faster is None:
             return
         n, e = sample.velocity_ne_m_s
-        self.taken_boot_us = strapdown.time_boot_us - round(1e6 * (late_s + numbers.CERTAIN * error_s))
+        self.taken_boot_us = strapdown.time_boot_us - round(1e6 * (self.late_s + numbers.CERTAIN * error_s))
         self.velocity_ned_m_s = (n + faster[0], e + faster[1], 0.0)
-        place = plus(self._counted_m(sample), 0.5 * late_s, plus((n, e, 0.0), 1.0, self.velocity_ned_m_s))
+        place = plus(self._counted_m(sample), 0.5 * self.late_s, plus((n, e, 0.0), 1.0, self.velocity_ned_m_s))
         if is_free and own is not None:
             since_s = 1e-6 * (strapdown.time_boot_us - own.time_boot_us)
             off = minus(plus(own.position_ned_m, since_s, own.velocity_ned_m_s), place)

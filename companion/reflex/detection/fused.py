@@ -72,7 +72,8 @@ class FusedState(DetectorState):
 
     def side_threshold_m_s2(self, config: reflex.FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
-        (p, q, r), speed_m_s = rates_frd_rad_s, math.hypot(*self.velocity_ned_m_s or ZERO)
+        speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
+        p, q, r = rates_frd_rad_s
         turning_rad_s = abs(p) + abs(q) + abs(r)
         return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
 
@@ -210,13 +211,12 @@ class FusedDetector:
             s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
-        force, confidence = ned_to_body(motion.strapdown.valid_wxyz, push), min(1.0, 0.5 * s.turn.value / s.turn.limit)
         impact = Impact(
             now_us,
             free_until_us,
-            force,
+            ned_to_body(motion.strapdown.valid_wxyz, push),
             evidence=Evidence.RATE_JUMP,
-            confidence=confidence,
+            confidence=min(1.0, 0.5 * (s.turn.value / s.turn.limit)),
             is_shown_twice=True,
             free_frd_m_s2=s.free_frd_m_s2,
         )
