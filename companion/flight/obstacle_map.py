@@ -46,6 +46,8 @@ class FlightRoom:
         Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
         """
         flight, known = self._flight, self._flight.known
+        if not known.patches:
+            return []
         place, clearance_m = flight.mission_ned_m(contact.position_ned_m), known.clearance_m
         normal = Normal(contact.normal_ned, contact.normal_error_rad)
         touch = touch_of(place, contact.velocity_ned_m_s, normal, known.reach_m, 0)
