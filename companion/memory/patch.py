@@ -155,7 +155,7 @@ def touch_of(
     return Patch.model_construct(
         touches_ned_m=(surface_ned_m,),
         normal_ned=normal.direction_ned,
-        normal_error_deg=math.degrees(normal.error_rad),
+        normal_error_deg=min(math.degrees(normal.error_rad), 90.0),
         reaches_m=reaches_m,
         found_at_us=found_at_us,
     )

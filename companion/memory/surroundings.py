@@ -30,6 +30,8 @@ ROUNDING_M = 0.02
 # A goal may lie nearer to a surface than the clearance. A touch's place is good to 0.1 m (see patch); 5 cm more between
 # guards and surface make it safe to fly to.
 LEAST_FREE_M = 0.15
+# A vehicle that keeps the clearance above or below a patch, but for so much, is beside it: recoveries end there.
+HEIGHT_SLACK_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,8 @@ class ObstacleMap:
     def between(self, points_ned_m: Sequence[Vector3], start_ned_m: Vector3) -> "ObstacleMap":
         """What of it stands at the heights of these points and between them, for a vehicle that starts there."""
         heights_m = [-point[2] for point in points_ned_m]
-        low_m, high_m = min(heights_m) - self.clearance_m, max(heights_m) + self.clearance_m
+        off_m = self.clearance_m - HEIGHT_SLACK_M
+        low_m, high_m = min(heights_m) - off_m, max(heights_m) + off_m
 
         def stands(patch: Patch) -> bool:
             bottom_m, top_m = patch.assumed_heights_m()
@@ -174,6 +177,8 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
     corners = filter(lambda corner: fence.contains(*corner), dict.fromkeys([*around, *(corners_ne_m or ())]))
     places: list[Place] = [start, goal, *(corner for corner in corners if not inner.intersects(Point(corner)))]
 
+    done = set[int]()
+
     def free_from(here: int) -> list[int]:
         """The places, of those not yet done with, to which a straight way is free."""
         others = [there for there in range(GOAL, len(places)) if there not in done]
@@ -187,7 +192,7 @@ def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None
         return [others[number] for number in np.flatnonzero(is_free)]
 
     # Of each way that is looked at: how long it is to the goal at least, its length so far, and its places.
-    queue, done = [(math.dist(start, goal), 0.0, [START])], set[int]()
+    queue = [(math.dist(start, goal), 0.0, [START])]
     while queue:
         _, length_m, way = heapq.heappop(queue)
         here = way[-1]

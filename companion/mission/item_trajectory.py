@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from companion.fence import Fence
 from companion.memory.surroundings import ROUNDING_M, ObstacleMap, route
 from companion.messages import Vector3
 from companion.mission import items
@@ -212,12 +213,21 @@ def looks(trajectory: Trajectory) -> list[Vector3]:
 
 
 def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
-    """By what is known, or by the edge of a polygon in which it begins. What has come out of it flies in."""
     if isinstance(trajectory, Chain):
         return any(_is_blocked(part, known) for part in trajectory.parts)
-    if not known.patches and not known.keeps_in:
+    if known.keeps_in and _leaves(trajectory, known.fence):
+        return True
+    if not known.patches:
         return False
-    places, fence = looks(trajectory), known.fence
-    begins_inside = known.keeps_in and fence.polygon_ne_m is not None and fence.outside_by_m(places[0]) == 0.0
-    leaves = begins_inside and any(fence.outside_by_m(place) > ROUNDING_M for place in places)
-    return leaves or known.block(places)
+    ends = (trajectory.start_m, trajectory.target_m) if isinstance(trajectory, LineProfile) else looks(trajectory)
+    return known.block(ends)
+
+
+def _leaves(trajectory: Trajectory, fence: Fence) -> bool:
+    """Whether it leaves a polygon in which it begins. What has come out of it flies in."""
+    if fence.polygon_ne_m is None or fence.outside_by_m(trajectory.at(0.0)[0]) > 0.0:
+        return False
+    if isinstance(trajectory, LineProfile):
+        end = trajectory.target_m[:2]
+        return math.dist(fence.shortened(trajectory.start_m[:2], end), end) > ROUNDING_M
+    return any(fence.outside_by_m(place) > ROUNDING_M for place in looks(trajectory))

@@ -37,7 +37,7 @@ MOTORS_RAD_S2 = 100.0
 # What is further off, in standard deviations, is beyond belief: PX4's gates, such as EKF2_GPS_V_GATE.
 GATE = 5.0
 # Memory of a velocity's noise in velocities: 3 s of the vehicle's own at 30 Hz, 10 to 20 s of a receiver's.
-MEMORY = 100
+MEMORY_STEPS = 100
 
 # --- the velocity's delay
 # Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
@@ -58,7 +58,7 @@ LEVEL_DRIFT_M2_S5 = (0.01 * GRAVITY_M_S2) ** 2
 EARTH_M = 6_371_000.0
 # Delay of a satellite receiver's velocity: PX4's default EKF2_GPS_DELAY; the receivers that ArduPilot knows have 0.1 to
 # 0.22 s (AP_GPS's get_lag), a simulated one none. Then its standard deviation, and the longest.
-RECEIVER_DELAY_S = (0.11, 0.06, 0.3)
+RECEIVER_DELAY_S, RECEIVER_SPREAD_S, RECEIVER_LATEST_S = 0.11, 0.06, 0.3
 # Receivers filter their velocities: ten of them, or a second, have the same error.
 RECEIVER_REPEATS = 10.0
 # Standard deviation of its noise before it is learnt: PX4's EKF2_GPS_V_NOISE. Not below twice the 0.05 m/s of u-blox's

@@ -28,7 +28,11 @@ class Doppler:
     late_s: float = 0.0  # carried on by so much
     variance_m2_s2: float = numbers.DOPPLER_M_S**2
     known: int = 1
-    delay: Delay = field(default_factory=lambda: Delay(*numbers.RECEIVER_DELAY_S, numbers.RECEIVER_REPEATS))
+    delay: Delay = field(
+        default_factory=lambda: Delay(
+            numbers.RECEIVER_DELAY_S, numbers.RECEIVER_SPREAD_S, numbers.RECEIVER_LATEST_S, numbers.RECEIVER_REPEATS
+        )
+    )
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
     _first: GpsFix | None = None  # where its places are counted from
     _off_m: Vector3 | None = None  # the vehicle's own place less the receiver's
@@ -76,7 +80,7 @@ class Doppler:
         if math.hypot(*plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change)) < most_m_s:
             self.delay.learn(behind, change)
         noise = limited(plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change), most_m_s)
-        self.known = min(self.known + 1, numbers.MEMORY)
+        self.known = min(self.known + 1, numbers.MEMORY_STEPS)
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 
 

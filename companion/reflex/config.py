@@ -185,6 +185,8 @@ LIES_US = 2 * LOW_US
 # Largest difference of the mean specific force from gravity, and largest rate, of a vehicle that lies while its motors
 # shake it; the mean is over about twenty samples.
 STILL_M_S2, STILL_RAD_S, LYING_SHARE = 1.0, 0.3, 0.05
+# Thrust acts along body z. A vehicle at rest whose weight is carried across it, or from above, does not fly.
+CARRIED_SHARE = 0.5
 
 # --- half-spaces
 # Cosine between two normals. Below it the surfaces face each other, as in a corridor: the goal is then no further from
@@ -202,7 +204,7 @@ ROUNDS = 5
 # slowest stream, against vibration; shorter than the estimate's noise lasts, longer than its delay. A contact counts so
 # long after its last sample: it may go on, or the filtered motion does not contain it yet.
 SMOOTHED_S = 0.05
-# Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle: thrust acts along body z.
+# Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.

@@ -52,7 +52,7 @@ class Situation(NamedTuple):
 
     off_reason: str | None = None  # why no hit may be reported now, but for a crash
     may_crash: bool = False  # it is known to fly, or did a moment ago, be it unwatched
-    is_on_ground: bool = False  # as the vehicle says
+    is_on_ground: bool = False  # as the vehicle says, unless it is known to be aloft
     height_m: float | None = None  # above the place of arming
     descent_commanded: bool = False  # or by the hand that flies it: touching the ground is no surprise
     setpoint_position_ned_m: Vector3 | None = None  # the place last sent, local NED, where one is flown to

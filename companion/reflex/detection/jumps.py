@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from companion.messages import Vector3
-from companion.motion.config import LONGEST_GAP_US, MEMORY, MOTORS_RAD_S2, SHOWN_US
+from companion.motion.config import LONGEST_GAP_US, MEMORY_STEPS, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.delay import Delay
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
@@ -110,7 +110,7 @@ class VelocityJump:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""
         self.delay.learn(*self.newest)
         square = along(step, step) / 3.0
-        self.known = min(self.known + 1, MEMORY)
+        self.known = min(self.known + 1, MEMORY_STEPS)
         self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
 
     def least_m_s(self, config: reflex.FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:

@@ -1,6 +1,7 @@
 """Position and velocity of a vehicle after a hit, although its own estimate may lack a part of the hit.
 
-A clipped accelerometer hides a part of the impulse. At a time t after the hit the vehicle reports
+A clipped accelerometer hides a part of the impulse. That part is missing in the vehicle's own velocity, and then in its
+position, until other sensors correct both. At a time t after the hit the vehicle reports
 
     v(t) + e g(t),    x(t) + e G(t)
 

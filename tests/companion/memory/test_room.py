@@ -126,6 +126,9 @@ def test_a_ceiling_whose_direction_is_not_known_well_bends_beside_its_touch():
     beside_m = ceiling.beside_m((3.0, 4.0, -1.0))
     assert beside_m == 5.0
     assert ceiling.bends_m(beside_m) == pytest.approx(5.0 * math.tan(ERROR_RAD))
+    # And a recovery that ends a clearance below it is clear
+    rests = (0.0, 0.0, CLEARANCE_M - ceiling.assumed_heights_m()[0])
+    assert all(around().joined([ceiling]).is_clear((0.0, 0.0, rests[2] + off_m), rests) for off_m in (0.0, -1e-9, 1e-9))
 
 
 # --- files
@@ -237,6 +240,11 @@ def test_a_flight_keeps_in_a_polygon_that_bends():
         trajectory_around(PathItem(points_ned_m=((2.0, 0.0, -1.5), (3.0, 0.0, -1.5))), start, PACE, known),
     ):
         assert planned.is_detour and all(arms.outside_by_m(place) < 0.05 for place in looks(planned.trajectory))
+    # And a line sees a slit that is narrower than any two places that would be looked at
+    slit = around(
+        fence=Fence(polygon_ne_m=[[-8, -2], [-8, 9], [6, 9], [6, 2.03], [-7, 2.03], [-7, 2], [6, 2], [6, -2]])
+    )
+    assert trajectory_around(GoToItem(position_ned_m=(2.0, 0.0, -1.5)), start, PACE, slit).is_detour
     # But from outside it goes straight in, and along its edge as the item says
     into = trajectory_around(GoToItem(position_ned_m=(2.0, 0.0, -1.5)), (8.0, 0.0, -1.5), PACE, known)
     edge = PathItem(points_ned_m=((0.0, 9.0, -1.5), (6.0, 9.0, -1.5)))
