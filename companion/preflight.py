@@ -183,8 +183,10 @@ def spread(vectors: Sequence[Vector3]) -> float:
 
 def findings(survey: Preflight) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
-    vehicle, fused, imu_hz = survey.vehicle, survey.config.fused, survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
-    autopilot, per_h = vehicle.autopilot, alarms_per_h(fused.noise_factor, imu_hz)
+    vehicle, fused = survey.vehicle, survey.config.fused
+    imu_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
+    per_h = alarms_per_h(fused.noise_factor, imu_hz)
+    autopilot = vehicle.autopilot
     setup = Setup(
         parameters=survey.parameters,
         line=survey.line,
@@ -287,8 +289,9 @@ def _time(survey: Preflight) -> PreflightItem:
     if median_us is None or worst_us is None:
         return judged("time", "TIMESYNC is not answered", True, survey.vehicle.autopilot.remedy_no_time)
     found = f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst"
-    is_bad, quick = median_us > MOST_TRIP_US, "a wire instead of a radio; serial: baud rate 921600"
-    remedy = "a wire or a direct link instead of this one" if is_bad else quick
+    is_bad = median_us > MOST_TRIP_US
+    quicker = "a wire instead of a radio; serial: baud rate 921600"
+    remedy = "a wire or a direct link instead of this one" if is_bad else quicker
     return judged("time", found, median_us > DOUBTFUL_TRIP_US, remedy, is_bad)
 
 

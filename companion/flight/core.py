@@ -109,7 +109,8 @@ class Core(ABC, Generic[FlightT]):
                 self._inform(now_us)
             except Exception as error:
                 self.fault(error, now_us)
-        sent, told, flight.outbox, flight.events = flight.outbox, flight.events, [], []
+        sent, told = flight.outbox, flight.events
+        flight.outbox, flight.events = [], []
         return sent, told
 
     def fault(self, error: Exception, now_us: int) -> None:
@@ -138,7 +139,8 @@ class Core(ABC, Generic[FlightT]):
 
         Heartbeats, setpoints and the log go on meanwhile. After a fault hits are not detected any more.
         """
-        flight, before, kinds = self.flight, self.handler, set(map(type, samples))
+        flight, before = self.flight, self.handler
+        kinds = set(map(type, samples))
         try:
             if not PLACES.isdisjoint(kinds):
                 samples = self._in_one_frame(samples, now_us)
@@ -196,7 +198,8 @@ class Core(ABC, Generic[FlightT]):
 
     def _release(self, text: str) -> None:
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
-        flight, self.handler = self.flight, Released(self.flight, self.now_us)
+        flight = self.flight
+        self.handler = Released(flight, self.now_us)
         if self.state not in self.giving_away or flight.outcome is None:
             self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
@@ -220,7 +223,7 @@ class Core(ABC, Generic[FlightT]):
         """The detector's situation."""
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
-        """Send the setpoint: at its rate, as the state changes, an attitude for each IMU sample. No other does."""
+        """Send the setpoint: at its rate, as the state changes, an attitude for each IMU sample. No other code does."""
         flight, limiter, target = self.flight, self.limiter, self.flight.target
         leans = target is not None and target.lean is not None
         is_at_once = moved or (leans and self.reflex.sample_boot_us != self._sample_boot_us)
@@ -260,7 +263,8 @@ class Core(ABC, Generic[FlightT]):
         """Tell the vehicle by what it is flown from now on; None: no more by this companion."""
         if leans == self._leans and not is_new:
             return
-        self._leans, told = leans, self.flight.vehicle.autopilot.changed_law(leans)
+        self._leans = leans
+        told = self.flight.vehicle.autopilot.changed_law(leans)
         self._law.cancel()
         if told is not None:
             self._law.begin(told)

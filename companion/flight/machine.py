@@ -21,7 +21,7 @@ from companion.messages import Sample
 from companion.mission.model import Mission
 from companion.reflex.detection.detector import Situation
 
-# What is done in each state; in the last two, see `FlightCore._enter`.
+# What is done in each state; for the ends DONE and ABORTED see `FlightCore._enter`.
 HANDLERS: Mapping[State, Callable[[Any, int], Handler[Any]]] = {
     State.CONNECT: Connect,
     State.READY: Ready,
@@ -67,7 +67,9 @@ class FlightCore(Core[FlightContext]):
         return super().next_deadline_us() if self.stop_reason is None else self.now_us
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
-        flight, self.stop_reason = self.flight, None
+        flight = self.flight
+        # A stop is taken up once.
+        self.stop_reason = None
         if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
             self._take(end, now_us)
         if flight.foreign_mode_since_us != self._away_us and flight.has_position and self.state in FOLLOWING:

@@ -155,7 +155,8 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, 
     A held vehicle that has climbed, and is not sent down, has not landed: the report may be forged, and a detector is
     off on the ground.
     """
-    is_aloft, place, target = is_held and flight.has_climbed and not goes_down, None, flight.target
+    is_aloft = is_held and flight.has_climbed and not goes_down
+    place, target = None, flight.target
     if is_held and target is not None and target.lean is None:
         place = target.position_ned_m
     height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m

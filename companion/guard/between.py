@@ -72,7 +72,9 @@ class Between:
 
     def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
-        client = self._clients.setdefault(name, _Client(Decoder({}, _is_whole)))
+        if name not in self._clients:
+            self._clients[name] = _Client(Decoder({}, _is_whole))
+        client = self._clients[name]
         if self.has_room(name):
             client.waiting += [packet for packet, _ in client.framer.feed(received) if not isinstance(packet, Stray)]
         elif not client.is_flood_told:

@@ -155,7 +155,8 @@ class Vehicle:
 
     def count_mode(self, report: messages.CurrentMode, failsafe: bool = False) -> None:
         """It is the vehicle's from now on."""
-        self.mode, self.is_failsafe_mode, self.pilot = report, failsafe, self.autopilot.pilot(report.custom_mode)
+        self.mode, self.is_failsafe_mode = report, failsafe
+        self.pilot = self.autopilot.pilot(report.custom_mode)
 
     def _update_armed(self, armed: bool) -> None:
         is_on_ground = self.landed is messages.LandedState.ON_GROUND

@@ -85,16 +85,19 @@ class Encoder:
                 return self._position(outgoing)
             case AttitudeSetpoint(time_us, attitude_wxyz, thrust_fraction, yaw_rate_rad_s):
                 head = (_time_ms(time_us), *self._target, self._autopilot.attitude_mask)
-                motion = (list(attitude_wxyz), 0.0, 0.0, yaw_rate_rad_s, thrust_fraction)
-                return dialect.MAVLink_set_attitude_target_message(*head, *motion)
+                rates_rad_s = (0.0, 0.0, yaw_rate_rad_s)
+                return dialect.MAVLink_set_attitude_target_message(
+                    *head, list(attitude_wxyz), *rates_rad_s, thrust_fraction
+                )
             case SendCommand(command, confirmation):
                 parameters = (*command.parameters, *(0.0,) * (7 - len(command.parameters)))
                 head = (*self._target, command.command_id, confirmation)
                 return dialect.MAVLink_command_long_message(*head, *parameters)
             case messages.OnboardHeartbeat(active):
                 status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
-                kind = (dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID)
-                return dialect.MAVLink_heartbeat_message(*kind, 0, 0, status, 3)
+                return dialect.MAVLink_heartbeat_message(
+                    dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
+                )
             case messages.NamedValue(time_us, name, value):
                 return dialect.MAVLink_named_value_float_message(_time_ms(time_us), name.encode(), value)
             case messages.DebugVector(time_us, name, vector):

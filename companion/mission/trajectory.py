@@ -36,7 +36,8 @@ class _Ramped:
         self.duration_s = distance_m / top_m_s + top_m_s * ramps_s2_per_m if top_m_s > 0.0 else 0.0
 
     def at(self, elapsed_s: float) -> Motion:
-        top, growth, braking, elapsed_s = self._top_m_s, self._growth_m_s2, self._braking_m_s2, max(0.0, elapsed_s)
+        top, growth, braking = self._top_m_s, self._growth_m_s2, self._braking_m_s2
+        elapsed_s = max(0.0, elapsed_s)
         ramp_s, remaining_s = top / growth, self.duration_s - elapsed_s
         if remaining_s <= 0.0:
             return self.target_m, ZERO, ZERO

@@ -185,11 +185,12 @@ class CollisionGuard:
         """On MAVSDK's thread, the last before the socket."""
         if name not in SETPOINTS and name not in REQUESTS:
             return True
-        with self._changed, self._guarded():
+        with self._changed:
             # Also of one that cannot be read
             passes = self._is_over or not self.holds or name in REQUESTS
             if not self._is_over and (packet := packet_from(name, source, fields_json)):
-                passes = self._guard.lets_pass(packet)
+                with self._guarded():
+                    passes = self._guard.lets_pass(packet)
         return passes
 
     def _send(self, step: StepResult) -> None:

@@ -61,6 +61,9 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
     assert core.state is State.STANDING_BY and not core.flight.is_wreck
     core.advance((), 5 * SECOND)
     assert core.handler.finished
+    core.state, core.handler, core.flight.fault = State.ENDED, core.handlers[State.WATCHING](core.flight, 0), ""
+    core.fault(ValueError("as it ends"), 5 * SECOND)
+    assert core.finished
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16

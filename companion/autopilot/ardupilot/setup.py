@@ -60,7 +60,8 @@ def port(setup: Setup) -> Iterator[PreflightItem]:
     remedy = f"{name}_BAUD = 921, reboot, {COMPANION_BAUD} in --connect"
     yield judged("port", f"{name}, {line.baud} baud", line.baud < COMPANION_BAUD, remedy)
     if told[f"{name}_PROTOCOL"] == MAVLINK_1:
-        protocol, found = f"{name}_PROTOCOL", "MAVLink 1: no stream comes at its rate"
+        protocol = f"{name}_PROTOCOL"
+        found = "MAVLink 1: no stream comes at its rate"
         yield judged(protocol, found, is_bad=True, remedy=f"{protocol} = 2, then reboot", mended=MAVLINK_2)
 
 

@@ -123,10 +123,11 @@ def _offboard_loss_time(name: str, loss_s: float, setup: Setup) -> PreflightItem
 def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
     number = int(action)
     called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
-    remedy, drops = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS
+    remedy = f"{name} = {LOSS_LAND} (land)"
+    drops, needs_sticks = number in LOSS_DROPS, number in LOSS_NEEDS_STICKS
     beyond = ": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns"
-    found, is_off = f"{number} ({called}) when setpoints stop", number in LOSS_NEEDS_STICKS
-    return judged(name, found, is_off, remedy, is_bad=drops, mended=LOSS_LAND, beyond=beyond)
+    found = f"{number} ({called}) when setpoints stop"
+    return judged(name, found, needs_sticks, remedy, is_bad=drops, mended=LOSS_LAND, beyond=beyond)
 
 
 def _radio(name: str, bits: float, setup: Setup) -> PreflightItem:

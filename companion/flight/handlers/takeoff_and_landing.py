@@ -220,7 +220,7 @@ LEAD_US = 40_000
 
 
 class RecoverInOffboard(Recover[FlightContext]):
-    """Out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
+    """A recovery. Out of the land mode its setpoints come first, then OFFBOARD, in which alone they are flown.
 
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
@@ -228,6 +228,7 @@ class RecoverInOffboard(Recover[FlightContext]):
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         super().__init__(flight, now_us)
         offboard = flight.vehicle.autopilot.setpoints
+        # It flies setpoints, and nothing else is asked for.
         self._is_taken = flight.own_modes == (offboard, None)
         # Of a second hit the first one's request may be on its way.
         self._is_asked = flight.command_client.requested_mode == offboard

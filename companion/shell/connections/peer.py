@@ -14,7 +14,7 @@ the vehicle learns the time from what it is sent.
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice, takewhile
+from itertools import islice
 from typing import TypeAlias
 
 from companion.autopilot.known import defaults
@@ -102,8 +102,7 @@ class Peer:
 
 def _packets(datagram: bytes) -> Iterator[bytes]:
     """The packets of known messages that a datagram begins with, their checksums right."""
-    return takewhile(_is_known, whole_packets(datagram))
-
-
-def _is_known(packet: bytes) -> bool:
-    return message_id_of(packet) in KNOWN_IDS and checksum_holds(packet, 0, len(packet))
+    for packet in whole_packets(datagram):
+        if message_id_of(packet) not in KNOWN_IDS or not checksum_holds(packet, 0, len(packet)):
+            return
+        yield packet
