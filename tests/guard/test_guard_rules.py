@@ -62,7 +62,8 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
     core.advance((), 5 * SECOND)
     assert core.handler.finished
     core.state, core.handler, core.flight.fault = State.ENDED, core.handlers[State.WATCHING](core.flight, 0), ""
-    core.fault(ValueError("as it ends"), 5 * SECOND)
+    core.handler.step = lambda *_: 1 / 0
+    core.advance((), 6 * SECOND)
     assert core.finished
 
 
