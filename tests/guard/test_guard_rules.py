@@ -64,7 +64,7 @@ def test_a_vehicle_that_is_met_anew_is_what_it_was_and_a_wreck_or_a_fault_does_n
     core.state, core.handler, core.flight.fault = State.ENDED, core.handlers[State.WATCHING](core.flight, 0), ""
     core.handler.step = lambda *_: 1 / 0
     core.advance((), 6 * SECOND)
-    assert core.finished
+    assert core.handler.finished
 
 
 ALTCTL, STABILIZED, MANUAL, ACRO = 2 << 16, 7 << 16, 1 << 16, 5 << 16
