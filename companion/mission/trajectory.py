@@ -1,6 +1,7 @@
 """Ways to fly with limited speed and acceleration, from rest to rest: lines, circles, curves, one after the other."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
@@ -20,7 +21,7 @@ TURNING_SHARE = 0.8
 SPEEDING_SHARE = 0.6
 
 
-class _Ramped:
+class _Ramped(ABC):
     """From rest to rest along a way of any shape by a trapezoidal speed: speed up, cruise, brake."""
 
     target_m: Vector3
@@ -47,9 +48,9 @@ class _Ramped:
             return self._motion(self.distance_m - 0.5 * braking * remaining_s**2, braking * remaining_s, -braking)
         return self._motion(0.5 * growth * ramp_s**2 + top * (elapsed_s - ramp_s), top, 0.0)
 
+    @abstractmethod
     def _motion(self, way_m: float, rate_m_s: float, change_m_s2: float) -> Motion:
         """The motion so far along the way, at a speed and an acceleration along it."""
-        raise NotImplementedError
 
 
 @dataclass
