@@ -1,13 +1,12 @@
 """Telemetry logs as every MAVLink tool reads them: 8 bytes of big-endian microseconds, then the packet."""
 
 import os
-import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from companion.mavlink.packet import Stray, message_id_of, packet_length
 
-_STAMP = struct.Struct(">Q")
+_STAMP_BYTES = 8
 # It carries the secret key: MAVLink asks to leave it out of logs (mavlink.io, "Message Signing", "Logging").
 SETUP_SIGNING = 256
 
@@ -34,8 +33,8 @@ class TlogWriter:
 
     def write(self, now_us: int, frames: Iterable[bytes]) -> None:
         """Log packets received or sent at `now_us` (microseconds since the epoch)."""
-        stamp = _STAMP.pack(now_us)
-        self._pending += [part for frame in frames for part in (stamp, frame)]
+        stamp = now_us.to_bytes(_STAMP_BYTES)
+        self._pending += [stamp + frame for frame in frames]
         if self._flushed_at_us is None:
             self._flushed_at_us = now_us
         elif now_us - self._flushed_at_us >= FLUSH_INTERVAL_US:
@@ -55,9 +54,8 @@ class TlogWriter:
             os.fdatasync(self._file.fileno())
 
     def close(self) -> None:
-        if not self._file.closed:
-            with self._file:
-                self.flush()
+        with self._file:
+            self.flush()
 
 
 def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
@@ -72,18 +70,18 @@ def packets_in(content: bytes) -> Iterator[tuple[int, bytes, int]]:
     """
     position = 0
     last_us: int | None = None
-    while position + _STAMP.size < len(content):
-        stamp_us = int(_STAMP.unpack_from(content, position)[0])
-        start = position + _STAMP.size
-        length = packet_length(content, start)
-        if length == 0 or not _plausible(stamp_us, last_us) or not _stamp_follows(content, start + length, stamp_us):
+    while (start := position + _STAMP_BYTES) < len(content):
+        stamp_us, end = int.from_bytes(content[position:start]), start + packet_length(content, start)
+        # After a packet comes another stamp or the end of the file.
+        follows = content[end : end + _STAMP_BYTES]
+        next_us = int.from_bytes(follows) if len(follows) == _STAMP_BYTES else None
+        if end == start or not _is_near(stamp_us, last_us) or not _is_near(stamp_us, next_us):
             position += 1
             continue
-        if start + length > len(content):
+        if end > len(content):
             return
-        yield stamp_us, content[start : start + length], start + length
-        last_us = stamp_us
-        position = start + length
+        yield stamp_us, content[start:end], end
+        last_us, position = stamp_us, end
 
 
 def may_be_logged(frame: bytes) -> bool:
@@ -94,12 +92,5 @@ def may_be_logged(frame: bytes) -> bool:
     return not isinstance(frame, Stray) and message_id_of(frame) != SETUP_SIGNING
 
 
-def _plausible(stamp_us: int, last_us: int | None) -> bool:
-    return last_us is None or abs(stamp_us - last_us) <= _LONGEST_GAP_US
-
-
-def _stamp_follows(content: bytes, end: int, stamp_us: int) -> bool:
-    """Whether what comes after a packet is another stamp or the end of the file."""
-    if end + _STAMP.size > len(content):
-        return True
-    return _plausible(int(_STAMP.unpack_from(content, end)[0]), stamp_us)
+def _is_near(stamp_us: int, other_us: int | None) -> bool:
+    return other_us is None or abs(stamp_us - other_us) <= _LONGEST_GAP_US
