@@ -155,11 +155,11 @@ class CollisionGuard:
         self.stop()
 
     async def __aenter__(self) -> Self:
-        await asyncio.get_running_loop().run_in_executor(None, self.start)
+        await asyncio.to_thread(self.start)
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await asyncio.get_running_loop().run_in_executor(None, self.stop)
+        await asyncio.to_thread(self.stop)
 
     def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread: the sample, and at once what follows from it."""

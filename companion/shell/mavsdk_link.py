@@ -7,6 +7,7 @@ I/O thread, the outgoing one on every message just before it is sent.
 
 import ctypes
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from companion.errors import ReboundError
@@ -49,7 +50,7 @@ class MavsdkLink:
             unsubscribe = self._function(f"mavsdk_unsubscribe_{direction}_messages_json", None)
             subscribe.argtypes = [ctypes.c_void_p, self._callback_class, ctypes.c_void_p]
             unsubscribe.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-            callback = self._callback_class(_as_c(interceptor))
+            callback = self._callback_class(partial(_ask, interceptor))
             handle = subscribe(self._mavsdk._handle, callback, None)
             # Mavsdk.destroy() releases what it finds here, so that either end may come first.
             self._mavsdk._subscriptions[handle] = (callback, unsubscribe)
@@ -76,9 +77,6 @@ class MavsdkLink:
         self._direct.destroy()
 
 
-def _as_c(interceptor: Interceptor) -> Callable[[Any, Any], int]:
-    def call(message: Any, _: Any) -> int:
-        source = (message.system_id, message.component_id)
-        return int(interceptor(message.message_name.decode(), source, message.fields_json))
-
-    return call
+def _ask(interceptor: Interceptor, message: Any, _: Any) -> int:
+    source = (message.system_id, message.component_id)
+    return int(interceptor(message.message_name.decode(), source, message.fields_json))
