@@ -1,9 +1,4 @@
-"""Byte streams to a vehicle, TCP and serial: opened again when they end, without anybody waiting for it.
-
-open    bytes pass
-lost    nothing passes; a thread opens the stream anew, at once and then every RETRY_S
-open    again: told and counted
-"""
+"""Byte streams to a vehicle, TCP and serial: opened again when they end, without anybody waiting for it."""
 
 import os
 import select
@@ -17,6 +12,7 @@ from functools import partial
 from io import RawIOBase
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from companion.autopilot.known import defaults
 from companion.errors import ConnectionSetupError
@@ -112,7 +108,7 @@ def _end_of_whole(content: bytes) -> int:
 
 
 class StreamConnection:
-    """A stream that is opened again for as long as the program runs.
+    """A stream that is opened again for as long as the program runs, at once and then every RETRY_S: told and counted.
 
     On a thread: a name is looked up, and a driver keeps whoever opens or closes a port of a device that is going, for
     seconds.
@@ -162,19 +158,17 @@ class StreamConnection:
             with suppress(OSError):
                 old.close()
         while not self._closed.is_set():
-            try:
+            # Whatever the system or a driver raises, the next attempt may find the other end.
+            with suppress(Exception):
                 self._found.put(self._open_anew())
                 return
-            except Exception:
-                # Whatever the system or a driver raises, the next attempt may find the other end.
-                self._closed.wait(RETRY_S)
+            self._closed.wait(RETRY_S)
 
     def fileno(self) -> int | None:
         return None if self._stream is None else self._stream.fileno()
 
     def way(self, frame: bytes) -> Way | None:
-        descriptor = self.fileno()
-        return None if descriptor is None else Way(frame, descriptor)
+        return None if self._stream is None else Way(frame, self._stream.fileno())
 
     def send(self, frame: bytes) -> None:
         if self._stream is not None:
@@ -208,8 +202,14 @@ def _connected(host: str, port: int, timeout_s: float) -> Stream:
     if connected.getpeername() == connected.getsockname():
         connected.close()
         raise ConnectionRefusedError("connection refused")
-    _set_up(connected)
-    return Stream(connected, f"{host}:{port}")
+    return _tcp_stream(connected, (host, port))
+
+
+def _tcp_stream(connected: socket.socket, address: Any) -> Stream:
+    # Packets are small and each is due now: Nagle's algorithm would hold setpoints back.
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
+    return Stream(connected, f"{address[0]}:{address[1]}")
 
 
 class TcpInConnection(StreamConnection):
@@ -219,22 +219,11 @@ class TcpInConnection(StreamConnection):
         self._listener = bound_socket(socket.SOCK_STREAM, host, port)
         self._listener.listen(1)
         self._listener.settimeout(RETRY_S)
-        super().__init__(None, self._client)
-
-    def _client(self) -> Stream:
-        client, address = self._listener.accept()
-        _set_up(client)
-        return Stream(client, f"{address[0]}:{address[1]}")
+        super().__init__(None, lambda: _tcp_stream(*self._listener.accept()))
 
     def close(self) -> None:
         super().close()
         self._listener.close()
-
-
-def _set_up(connected: socket.socket) -> None:
-    # Packets are small and each is due now: Nagle's algorithm would hold setpoints back.
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
 
 
 class SerialConnection(StreamConnection):
