@@ -6,7 +6,6 @@ bytes come inside another's packet: an unfinished packet stays here, and so do b
 """
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.autopilot.known import ASSUMED
@@ -72,9 +71,7 @@ class Between:
 
     def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
-        if name not in self._clients:
-            self._clients[name] = _Client(Decoder({}, _is_whole))
-        client = self._clients[name]
+        client = self._clients[name] = self._clients.get(name) or _Client(Decoder({}, _is_whole))
         if self.has_room(name):
             client.waiting += [packet for packet, _ in client.framer.feed(received) if not isinstance(packet, Stray)]
         elif not client.is_flood_told:
@@ -140,17 +137,6 @@ class Between:
         times = fields_of(packet)
         # A question says nothing of when it was answered.
         return times["tc1"] != 0 and times["ts1"] in self._asked
-
-
-def datagrams(packets: Sequence[bytes], most_bytes: int) -> list[bytes]:
-    """As few as hold them, each of whole packets."""
-    grouped: list[bytes] = []
-    for packet in packets:
-        if grouped and len(grouped[-1]) + len(packet) <= most_bytes:
-            grouped[-1] += packet
-        else:
-            grouped.append(packet)
-    return grouped
 
 
 def _is_whole(data: bytes, start: int, length: int) -> bool:

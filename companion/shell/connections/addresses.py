@@ -11,7 +11,7 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 import ipaddress
 import re
 import socket
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from companion.errors import AddressError, ConnectionSetupError
 from companion.mavlink.signing import Signing
@@ -24,7 +24,6 @@ Opened: TypeAlias = UdpConnection | StreamConnection
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
 _MOST_PORT = 65_535  # 16 bits
-_BROADCAST = ipaddress.IPv4Address("255.255.255.255")
 _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
@@ -44,8 +43,7 @@ def open_connection(url: str, peer: str | None = None, signing: Signing | None =
     `waits`: a port that is not there, or a server that does not answer, is looked for until it is.
     Raises ConnectionSetupError with one clear sentence.
     """
-    address = parsed(url)
-    _, scheme, host, port = address
+    _, scheme, host, port = address = parsed(url)
     if peer is not None and scheme != "udpin":
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     match scheme:
@@ -55,7 +53,7 @@ def open_connection(url: str, peer: str | None = None, signing: Signing | None =
             return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
         case "tcpin":
             return TcpInConnection(host, port)
-    check_one_host(address)
+    one_host(address)
     return udp_out(host, port) if scheme == "udpout" else tcp_out(host, port, waits)
 
 
@@ -104,18 +102,19 @@ def _meant(text: str) -> str | None:
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
-def check_one_host(remote: Endpoint) -> None:
-    """Only who answers from the address that was sent to is ever heard."""
+def one_host(remote: Endpoint) -> tuple[socket.AddressFamily, Any]:
+    """Its family and address. Only who answers from the address that was sent to is ever heard."""
     url, scheme, host, port = remote
     if not host or port == 0:
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
-    _, address = resolve(host, port)
+    family, address = resolve(host, port)
     number = ipaddress.ip_address(address[0])
     if number.is_unspecified:
         listening = f"{scheme.removesuffix('out')}in://{host}:{port}"
         raise AddressError(f"{url!r} names any host: to listen, use {listening}; to send, name one.")
-    if number.is_multicast or number == _BROADCAST:
+    if number.is_multicast or address[0] == "255.255.255.255":
         raise AddressError(f"{url!r} names many hosts: give the vehicle's own address.")
+    return family, address
 
 
 def _peer(text: str, listening: str) -> tuple[str, int | None]:

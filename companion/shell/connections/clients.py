@@ -11,9 +11,9 @@ from contextlib import suppress
 from typing import Any
 
 from companion.errors import AddressError
-from companion.guard.between import Between, datagrams
-from companion.shell.connections.addresses import Opened, check_one_host, parsed
-from companion.shell.connections.connection import Way, bound_socket, resolve, send_datagram
+from companion.guard.between import Between
+from companion.shell.connections.addresses import Opened, one_host, parsed
+from companion.shell.connections.connection import Way, bound_socket, send_datagram
 from companion.shell.connections.streams import BITS_A_BYTE
 
 # A sender of heartbeats has missed nine.
@@ -62,7 +62,7 @@ class UdpPort:
                     self._between.news.append(f"{_name(sender)} sends to the clients' port, too; it is not listened to")
 
     def send(self, packets: Sequence[bytes]) -> None:
-        for datagram in datagrams(packets, DATAGRAM_BYTES):
+        for datagram in _datagrams(packets):
             for remote in self._heard_us:
                 send_datagram(self._socket, datagram, remote)
 
@@ -192,8 +192,7 @@ def carried_bytes_s(url: str) -> float:
 
 
 def _open(url: str, between: Between) -> UdpPort | TcpPort:
-    address = parsed(url)
-    _, scheme, host, port = address
+    _, scheme, host, port = address = parsed(url)
     if scheme not in ("udpin", "udpout", "tcpin"):
         forms = "udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"
         raise AddressError(f"--between {url}: clients come by {forms}.")
@@ -201,9 +200,19 @@ def _open(url: str, between: Between) -> UdpPort | TcpPort:
         return TcpPort(bound_socket(socket.SOCK_STREAM, host, port), between)
     if scheme == "udpin":
         return UdpPort(bound_socket(socket.SOCK_DGRAM, host, port), None, between)
-    check_one_host(address)
-    family, remote = resolve(host, port)
+    family, remote = one_host(address)
     return UdpPort(socket.socket(family, socket.SOCK_DGRAM), remote, between)
+
+
+def _datagrams(packets: Sequence[bytes]) -> list[bytes]:
+    """As few as hold them, each of whole packets."""
+    grouped: list[bytes] = []
+    for packet in packets:
+        if grouped and len(grouped[-1]) + len(packet) <= DATAGRAM_BYTES:
+            grouped[-1] += packet
+        else:
+            grouped.append(packet)
+    return grouped
 
 
 def _name(address: Any) -> str:
