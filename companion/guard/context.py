@@ -1,5 +1,6 @@
 """What the guard's parts share: a flight's context, and whose vehicle it was before."""
 
+import math
 from dataclasses import dataclass, field
 
 from companion.flight.context import FlightContext, Transition
@@ -23,11 +24,11 @@ class GuardContext(FlightContext):
     has_stood: bool = False  # on the ground, or disarmed, since the guard began
     awaits_choice: bool = False  # a program's setpoints are kept out until somebody chooses a mode
     left_alone: int = 0  # hits told, and left to the program that flies
-    others_setpoint_us: int | None = None  # when one was last seen on its way
-    asked: Asked | None = None  # where it leads
+    others_setpoint_us: float = -math.inf  # when one was last seen on its way
+    asked: Asked = field(default=Asked())  # where it leads
     sticks: Sticks | None = None  # before the hit
     sticks_now: Sticks | None = None
-    sticks_us: int | None = None  # when these were heard
+    sticks_us: float = -math.inf  # when these were heard
     sinks_m_s: float = 0.0  # as its position control is asked for
     sinks_us: int | None = None  # when that was heard
 

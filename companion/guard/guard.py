@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from companion.autopilot.known import ASSUMED, defaults
@@ -55,21 +55,18 @@ class Guard(Stepped[GuardCore]):
         A place without a velocity moves as it has moved since the one before.
         """
         guard, shift, now_us = self.core.flight, self.core.resets.shift_ned_m, self.core.now_us
-        before, before_us = guard.asked, guard.others_setpoint_us
+        before, since_s = guard.asked.place_ned_m, (now_us - guard.others_setpoint_us) * 1e-6
         if shift != self._shift_ned_m:
             # The frame has moved since the one before, and not the place.
-            self._shift_ned_m, before_us = shift, None
-        if asked.place_ned_m is not None:
-            asked = replace(asked, place_ned_m=minus(asked.place_ned_m, shift))
-        guard.asked, guard.others_setpoint_us = asked, now_us
-        if before is None or before.place_ned_m is None or asked.place_ned_m is None or before_us is None:
-            return
-        since_s = (now_us - before_us) * 1e-6
-        if asked.velocity_ned_m_s is None and 0.0 < since_s < LONGEST_BETWEEN_S:
-            velocity = plus(ZERO, 1.0 / since_s, minus(asked.place_ned_m, before.place_ned_m))
-            # What goes faster than a vehicle is the next place, and no motion.
-            if math.hypot(*velocity) <= guard.mission.limits.max_speed_m_s:
-                guard.asked = replace(asked, velocity_ned_m_s=velocity)
+            self._shift_ned_m, before = shift, None
+        place, velocity = asked.place_ned_m, asked.velocity_ned_m_s
+        if place is not None:
+            place = minus(place, shift)
+            if velocity is None and before is not None and 0.0 < since_s < LONGEST_BETWEEN_S:
+                moves = plus(ZERO, 1.0 / since_s, minus(place, before))
+                # What goes faster than a vehicle is the next place, and no motion.
+                velocity = moves if math.hypot(*moves) <= guard.mission.limits.max_speed_m_s else None
+        guard.asked, guard.others_setpoint_us = Asked(place, velocity), now_us
 
     def hear_choice(self) -> None:
         """A client has asked for a mode."""

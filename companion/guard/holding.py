@@ -94,7 +94,7 @@ class GiveBack(GiveAway[GuardContext]):
             guard.report(now_us, "not_back", f"not given back: {reason}")
         autopilot = guard.vehicle.autopilot
         heard_us = guard.others_setpoint_us if self.wish == autopilot.setpoints else guard.sticks_us
-        streams = heard_us is not None and now_us - heard_us < OTHERS_STOPPED_US
+        streams = now_us - heard_us < OTHERS_STOPPED_US
         may_wait = autopilot.pilot(self.wish) is not Pilot.AUTOPILOT and inputs.stop_reason is None
         if may_wait and streams and silent_position(guard) is None:
             return True
@@ -151,7 +151,7 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
     """Why the mode would hit again; None where it would not."""
     autopilot = guard.vehicle.autopilot
     if mode == autopilot.setpoints:
-        does_lead = lead_into(guard, guard.asked or Asked(), CERTAIN)
+        does_lead = lead_into(guard, guard.asked, CERTAIN)
         if does_lead is None:
             return "nobody knows where the program's setpoints lead: choose a mode"
         return "the program's setpoints lead into what was hit: send others, or choose a mode" if does_lead else None

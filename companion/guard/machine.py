@@ -114,11 +114,9 @@ class GuardCore(Core[GuardContext]):
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> None:
         guard = self.flight
         sticks = [sample for sample in samples if isinstance(sample, Sticks)]
-        if sticks and self.state not in HOLDING:
-            guard.sticks = sticks[-1]
-        elif sticks and guard.sticks is None:
-            # Nobody had a stick in hand before the hit.
-            guard.sticks = sticks[0]
+        if sticks:
+            # Where nobody had a stick in hand before the hit, the first of afterwards.
+            guard.sticks = guard.sticks or sticks[0] if self.state in HOLDING else sticks[-1]
         if guard.vehicle.armed is False and self.resets.has_shifted:
             # It may restart, and count its resets from zero.
             self.resets = Resets()
@@ -158,7 +156,7 @@ class GuardCore(Core[GuardContext]):
         """A program that was given back to, and would hit the same again."""
         guard, asked = self.flight, self.flight.asked
         was_given = guard.config.then == "previous" and guard.hits and guard.vehicle.flies_setpoints
-        if self.state is not State.WATCHING or not was_given or asked is None or asked is self._judged:
+        if self.state is not State.WATCHING or not was_given or asked is self._judged:
             return None
         self._judged = asked
         if not lead_into(guard, asked):

@@ -146,12 +146,9 @@ class Watching(Handler[GuardContext]):
 
     def target(self, guard: GuardContext, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
-        vehicle, seen_us = guard.vehicle, guard.others_setpoint_us
-        streams_elsewhere = guard.program_elsewhere or (seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US)
-        is_wanted = vehicle.autopilot.wants_setpoints_first and not vehicle.flies_setpoints
-        if not is_wanted or streams_elsewhere:
-            return None
-        return Target(guard.latest.position_ned_m, None)
+        streams_elsewhere = guard.program_elsewhere or now_us - guard.others_setpoint_us < OTHERS_STOPPED_US
+        is_wanted = guard.vehicle.autopilot.wants_setpoints_first and not guard.vehicle.flies_setpoints
+        return Target(guard.latest.position_ned_m, None) if is_wanted and not streams_elsewhere else None
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # Where the mode needs no stream, one that has left it may have been sent somewhere once.
