@@ -210,6 +210,6 @@ def test_a_host_that_acknowledges_nothing_is_given_up_within_a_second_and_no_pac
     # The kernel is asked for it: a vehicle that went down without a word sends no end of its connection
     listener = closing(socket.create_server((LOCAL, 0)))
     client = closing(open_connection(f"tcpout://{LOCAL}:{listener.getsockname()[1]}"))
-    with socket.socket(fileno=os.dup(client._stream._port.fileno())) as same:
+    with socket.socket(fileno=os.dup(client._stream.port.fileno())) as same:
         assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1000
         assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

@@ -46,20 +46,20 @@ class Stream:
 
     def __init__(self, port: socket.socket | RawIOBase, at: str, byte_s: float = 0.0) -> None:
         """`port`: a socket or a serial port. `at` is its address or device, for people; `byte_s` a byte's time."""
-        self._port, self.at, self._byte_s = port, at, byte_s
-        self._descriptor = port.fileno()
+        self.port, self.at, self._byte_s = port, at, byte_s
+        self.descriptor = port.fileno()
         self.broken = False
         self._begun = b""
-        os.set_blocking(self._descriptor, False)
+        os.set_blocking(self.descriptor, False)
 
     def receive(self, timeout_s: float) -> bytes:
         until_s = time.monotonic() + timeout_s
         while not self.broken:
             self._await_rest(until_s)
-            if not readable(self._descriptor, until_s - time.monotonic()):
+            if not readable(self.descriptor, until_s - time.monotonic()):
                 break
             try:
-                content = os.read(self._descriptor, READ_SIZE)
+                content = os.read(self.descriptor, READ_SIZE)
             except BlockingIOError:
                 return b""
             except OSError:
@@ -78,25 +78,17 @@ class Stream:
         if self._begun and left_s > 0.0:
             time.sleep(min(self._byte_s * (packet_length(self._begun) - len(self._begun)), left_s))
 
-    def fileno(self) -> int:
-        return self._descriptor
-
     def send(self, frame: bytes) -> None:
         remaining = memoryview(frame)
         while remaining and not self.broken:
             try:
-                written = os.write(self._descriptor, remaining)
-            except BlockingIOError:
-                written = 0
+                with suppress(BlockingIOError):
+                    remaining = remaining[os.write(self.descriptor, remaining) :]
             except OSError:
                 self.broken = True
                 return
-            remaining = remaining[written:]
-            if remaining and not select.select([], [self._descriptor], [], SEND_TIMEOUT_S)[1]:
+            if remaining and not select.select([], [self.descriptor], [], SEND_TIMEOUT_S)[1]:
                 return
-
-    def close(self) -> None:
-        self._port.close()
 
 
 def _end_of_whole(content: bytes) -> int:
@@ -156,7 +148,7 @@ class StreamConnection:
         if old is not None:
             # A driver may refuse to close a port whose device has gone: it is opened anew all the same.
             with suppress(OSError):
-                old.close()
+                old.port.close()
         while not self._closed.is_set():
             # Whatever the system or a driver raises, the next attempt may find the other end.
             with suppress(Exception):
@@ -165,10 +157,10 @@ class StreamConnection:
             self._closed.wait(RETRY_S)
 
     def fileno(self) -> int | None:
-        return None if self._stream is None else self._stream.fileno()
+        return None if self._stream is None else self._stream.descriptor
 
     def way(self, frame: bytes) -> Way | None:
-        return None if self._stream is None else Way(frame, self._stream.fileno())
+        return None if self._stream is None else Way(frame, self._stream.descriptor)
 
     def send(self, frame: bytes) -> None:
         if self._stream is not None:
@@ -181,7 +173,7 @@ class StreamConnection:
         """What a thread still opens ends with the program."""
         self._closed.set()
         if self._stream is not None:
-            self._stream.close()
+            self._stream.port.close()
 
 
 def tcp_out(host: str, port: int, waits: bool = False) -> StreamConnection:
