@@ -88,7 +88,6 @@ class CollisionGuard:
         """Give the vehicle back if the guard holds it, and release MAVSDK. Takes 10 s at most."""
         with self._changed:
             self._guard.core.stop_reason = "stopped by the program"
-            self._changed.notify_all()
             self._changed.wait_for(lambda: self._guard.core.handler.finished or self._is_over, GIVING_BACK_US * 1e-6)
             self._is_over = True
             self._changed.notify_all()
@@ -102,7 +101,6 @@ class CollisionGuard:
         """Watch again after the guard has stood down for a pilot."""
         with self._changed:
             self._guard.core.is_enabled = True
-            self._changed.notify_all()
 
     @property
     def state(self) -> State:
