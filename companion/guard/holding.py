@@ -76,10 +76,9 @@ class GiveBack(GiveAway[GuardContext]):
             guard.is_to_hold = True
             if guard.config.then == "previous":
                 guard.report(now_us, "not_back", f"not given back: recovery {hits} of at most {limit}")
-        self._wishes: list[int] = []
+        self._wishes = [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
         if guard.config.then == "previous" and not guard.is_to_hold and previous is not None:
-            self._wishes.append(previous)
-        self._wishes += [guard.vehicle.autopilot.hold, guard.vehicle.autopilot.land]
+            self._wishes.insert(0, previous)
         self._is_told = False
         self._is_doubted = self.wish == previous  # whether it would hit again
 

@@ -153,7 +153,6 @@ class Watching(Handler[GuardContext]):
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # Where the mode needs no stream, one that has left it may have been sent somewhere once.
         streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
-        if streams and not guard.keeps_others_out:
-            guard.program_elsewhere = True
+        guard.program_elsewhere |= streams and not guard.keeps_others_out
         reason = why_not(guard)
         return None if reason is None else Transition(Trigger.NOT_TO_GUARD, reason)
