@@ -100,7 +100,7 @@ def _end_of_whole(content: bytes) -> int:
 
 
 class StreamConnection:
-    """A stream that is opened again for as long as the program runs, at once and then every RETRY_S: told and counted.
+    """A stream that is opened again, at once and then every RETRY_S, for as long as the program runs. That is counted.
 
     On a thread: a name is looked up, and a driver keeps whoever opens or closes a port of a device that is going, for
     seconds.
