@@ -87,15 +87,6 @@ class Refused(Sample):
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleText(Sample):
-    """STATUSTEXT of the vehicle, a warning or worse: why it does not arm, or which failsafe acts. A long one comes in
-    pieces, each by itself.
-    """
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Heartbeat(Sample):
     system_id: int
     component_id: int
@@ -233,8 +224,19 @@ class TimeSync(Sample, Outgoing):
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter(Sample):
-    """PARAM_VALUE; whole numbers are int."""
+class StatusText(Sample, Outgoing):
+    """STATUSTEXT, either way: a long one goes in as many packets as it needs, and comes in pieces, each by itself.
+
+    Of the vehicle's it is a warning or worse: why it does not arm, or which failsafe acts.
+    """
+
+    severity: int  # MAV_SEVERITY
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Sample, Outgoing):
+    """PARAM_VALUE, or PARAM_SET on its way to the vehicle. Whole numbers are int: INT32 for PX4, all others REAL32."""
 
     name: str
     value: int | float
@@ -329,37 +331,12 @@ class ReadParameter(Outgoing):
 
 
 @dataclass(frozen=True, slots=True)
-class SetParameter(Outgoing):
-    """PARAM_SET; an int is sent as INT32, a float as REAL32, as PX4 has them."""
-
-    name: str
-    value: int | float
-
-
-@dataclass(frozen=True, slots=True)
-class StatusText(Outgoing):
-    """STATUSTEXT, in as many packets as its length needs."""
-
-    severity: Severity
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class NamedValue(Outgoing):
-    """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
+    """NAMED_VALUE_FLOAT, or DEBUG_VECT with a vector's three numbers; the name has at most ten characters."""
 
     time_us: int
     name: str
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class DebugVector(Outgoing):
-    """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
-
-    time_us: int
-    name: str
-    vector: Vector3
+    value: float | Vector3
 
 
 @dataclass(frozen=True, slots=True)

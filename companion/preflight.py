@@ -104,7 +104,7 @@ class Preflight:
     def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
         """Packets that set it. `parameters` has the vehicle's answer after further steps."""
         self.parameters.pop(name, None)
-        return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))
+        return (*self._encoder.packets(messages.Parameter(name, value)), *self.step(b"", now_us))
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
         """A step without the codec."""

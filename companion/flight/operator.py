@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any
 
 from companion.memory.patch import LEAST_SPEED_M_S
-from companion.messages import DebugVector, NamedValue, Severity, StatusText, Vector3
+from companion.messages import NamedValue, Severity, StatusText, Vector3
 from companion.reflex.detection.detector import Phase
 from companion.reflex.detection.monitor import CollisionMonitor
 from companion.reflex.recovery.collision import CollisionRecord
@@ -88,10 +88,10 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
 
 def values(
     state: Enum, monitor: CollisionMonitor, latest: CollisionRecord | None, hits: int, time_us: int
-) -> list[NamedValue | DebugVector]:
+) -> list[NamedValue]:
     """The state's and the detector's numbers: of a state and a phase its place among all, of one without data -1."""
     phase = float(list(Phase).index(monitor.state.phase)) if monitor.no_data_reason is None else -1.0
-    sent: list[NamedValue | DebugVector] = [
+    sent = [
         NamedValue(time_us, "rb_state", float(list(type(state)).index(state))),
         NamedValue(time_us, "rb_phase", phase),
         NamedValue(time_us, "rb_thresh", monitor.state.threshold_m_s2),
@@ -99,8 +99,8 @@ def values(
     ]
     if latest is not None:
         sent.append(NamedValue(time_us, "rb_peak", latest.peak_specific_force_m_s2))
-        sent.append(DebugVector(time_us, "rb_v_c", latest.contact.velocity_ned_m_s))
-        sent.append(DebugVector(time_us, "rb_normal", latest.normal.direction_ned))
+        sent.append(NamedValue(time_us, "rb_v_c", latest.contact.velocity_ned_m_s))
+        sent.append(NamedValue(time_us, "rb_normal", latest.normal.direction_ned))
     return sent
 
 

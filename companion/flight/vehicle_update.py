@@ -47,7 +47,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 text = f"{sample.message} is not accepted: {sample.reason}"
                 flight.report(now_us, "implausible", text, message=sample.message)
             continue
-        elif isinstance(sample, messages.VehicleText) and sample.text != vehicle.said:
+        elif isinstance(sample, messages.StatusText) and sample.text != vehicle.said:
             vehicle.said = sample.text
             flight.report(now_us, "warning", f"the vehicle warns: {sample.text}")
         elif isinstance(sample, messages.Parameter) and sample.name in vehicle.autopilot.attitude_parameters:

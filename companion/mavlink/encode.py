@@ -75,7 +75,7 @@ class Encoder:
             # the last part ends the text by being shorter than the field
             parts += [b""] if len(parts[-1]) == TEXT_LENGTH else []
         return [
-            dialect.MAVLink_statustext_message(int(status.severity), part, number, sequence)
+            dialect.MAVLink_statustext_message(status.severity, part, number, sequence)
             for sequence, part in enumerate(parts)
         ]
 
@@ -85,10 +85,8 @@ class Encoder:
                 return self._position(outgoing)
             case AttitudeSetpoint(time_us, attitude_wxyz, thrust_fraction, yaw_rate_rad_s):
                 head = (_time_ms(time_us), *self._target, self._autopilot.attitude_mask)
-                rates_rad_s = (0.0, 0.0, yaw_rate_rad_s)
-                return dialect.MAVLink_set_attitude_target_message(
-                    *head, list(attitude_wxyz), *rates_rad_s, thrust_fraction
-                )
+                motion = (list(attitude_wxyz), 0.0, 0.0, yaw_rate_rad_s)
+                return dialect.MAVLink_set_attitude_target_message(*head, *motion, thrust_fraction)
             case SendCommand(command, confirmation):
                 parameters = (*command.parameters, *(0.0,) * (7 - len(command.parameters)))
                 head = (*self._target, command.command_id, confirmation)
@@ -98,17 +96,17 @@ class Encoder:
                 return dialect.MAVLink_heartbeat_message(
                     dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
                 )
+            case messages.NamedValue(time_us, name, tuple(vector)):
+                return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case messages.NamedValue(time_us, name, value):
                 return dialect.MAVLink_named_value_float_message(_time_ms(time_us), name.encode(), value)
-            case messages.DebugVector(time_us, name, vector):
-                return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case ComputerStatus():
                 return _computer(outgoing)
             case messages.TimeSync(asked_ns, answered_ns):
                 return dialect.MAVLink_timesync_message(answered_ns or 0, asked_ns)
             case messages.ReadParameter(name):
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
-            case messages.SetParameter(name, value):
+            case messages.Parameter(name, value):
                 told = (float(value), _REAL) if self._autopilot.casts_whole_numbers else _as_float(value)
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *told)
 

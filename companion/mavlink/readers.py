@@ -288,7 +288,7 @@ def _radio(chan1_raw: int, chan2_raw: int, chan3_raw: int, chan4_raw: int) -> Sa
 
 def _vehicle_text(severity: int, text: bytes) -> Sample | None:
     said = "".join(filter(str.isprintable, text.decode("utf-8", errors="replace")))
-    return messages.VehicleText(said) if said and severity <= messages.Severity.WARNING else None
+    return messages.StatusText(severity, said) if said and severity <= messages.Severity.WARNING else None
 
 
 def _autopilot_version(flight_sw_version: int) -> Sample:

@@ -31,7 +31,6 @@ from companion.messages import (
     PositionSetpoint,
     Refused,
     SendCommand,
-    SetParameter,
 )
 from companion.reflex.config import EstimateConfig
 from rebound_cli.live.console import Console
@@ -201,7 +200,7 @@ def heard(*messages):
 @pytest.mark.parametrize("kind", [mav.MAV_PARAM_TYPE_INT8, mav.MAV_PARAM_TYPE_INT16, mav.MAV_PARAM_TYPE_INT32])
 def test_a_whole_number_travels_as_a_float_both_ways(kind):
     assert heard(mav.MAVLink_param_value_message(b"GUID_OPTIONS", 12.0, kind, 1, 0)) == Parameter("GUID_OPTIONS", 12)
-    message = sent(SetParameter("GUID_OPTIONS", 12))
+    message = sent(Parameter("GUID_OPTIONS", 12))
     assert (message.param_value, message.param_type) == (12.0, mav.MAV_PARAM_TYPE_REAL32)
     assert heard(mav.MAVLink_param_value_message(b"GUID_OPTIONS", math.nan, kind, 1, 0)) is None
 

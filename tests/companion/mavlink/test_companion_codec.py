@@ -80,7 +80,7 @@ CASES = [
     ),
     (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), ours.Battery(42)),
     # What a terminal would obey is left out, PX4's closing tab, too
-    (mav.MAVLink_statustext_message(4, b"Preflight Fail: \x1b[2J\t"), ours.VehicleText("Preflight Fail: [2J")),
+    (mav.MAVLink_statustext_message(4, b"Preflight Fail: \x1b[2J\t"), ours.StatusText(4, "Preflight Fail: [2J")),
 ]
 
 
@@ -299,7 +299,7 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
         (ours.ReadParameter("COM_OF_LOSS_T"), {"target_system": 7, "param_id": "COM_OF_LOSS_T", "param_index": -1}),
         (ours.NamedValue(1_500_000, "rb_thresh", 4.25), {"name": "rb_thresh", "value": 4.25, "time_boot_ms": 1500}),
         (
-            ours.DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
+            ours.NamedValue(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
             {"name": "rb_v_c", "x": 2.0, "y": -1.0, "z": 0.5, "time_usec": 1_500_000},
         ),
     ],
@@ -313,6 +313,6 @@ def test_what_is_sent_is_an_onboard_computers_of_the_vehicles_system(outgoing, f
 
 @pytest.mark.parametrize(("value", "kind"), [(0.5, 9), (4, 6), (-1, 6)])
 def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
-    m = sent(ours.SetParameter("COM_OBL_RC_ACT", value))
+    m = sent(ours.Parameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
