@@ -78,7 +78,7 @@ class Signing:
         for packet, _ in self._framer.feed(received):
             if packet_length(packet) != len(packet):
                 continue
-            reason = self._refusal(packet)
+            reason = self.refusal(packet)
             if reason is None:
                 stamp = self._streams[_stream(packet)] = _stamp(packet)
                 self.stamp = max(self.stamp, stamp)
@@ -93,10 +93,6 @@ class Signing:
         content = _with_flags(packet, FLAG_SIGNED) + bytes((_LINK_ID,)) + self.stamp.to_bytes(6, "little")
         return content + self._hash(content)
 
-    def is_genuine(self, packet: bytes) -> bool:
-        """Whether `opened` would let it through; nothing changes."""
-        return self._refusal(packet) is None
-
     def _is_packet(self, data: bytes, start: int, length: int) -> bool:
         """Of a message that the dialect does not have the signature alone tells; without it, it may be stray bytes
         round genuine packets."""
@@ -109,7 +105,8 @@ class Signing:
         """Whether it was signed with the key, at whatever time."""
         return has_signature(packet) and hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:])
 
-    def _refusal(self, packet: bytes) -> str | None:
+    def refusal(self, packet: bytes) -> str | None:
+        """Why `opened` would not let it through, or None; nothing changes."""
         if not has_signature(packet):
             return UNSIGNED
         # Signature first: the stamp of a forged packet means nothing.

@@ -101,9 +101,9 @@ def test_who_was_named_is_heard_alone_before_and_after(port):
 
 
 def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address():
-    # Given packets of which those with an even sequence number are genuine
+    # Given packets of which one is genuine
     genuine, forged = (made("HEARTBEAT", OF_PX4, number=number) for number in (0, 1))
-    peer, moved = Peer(signing=Mock(is_genuine=lambda packet: packet[4] % 2 == 0)), ("192.168.4.1", 50_001)
+    peer, moved = Peer(signing=Mock(refusal={genuine: None, forged: "forged"}.get)), ("192.168.4.1", 50_001)
     # Then a forged heartbeat pins nothing
     peer.accepts(forged, STRANGER, 0)
     assert peer.accepts(forged, VEHICLE, 0)
@@ -117,7 +117,7 @@ def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address
 
 def test_a_stranger_without_the_key_is_not_answered_in_the_place_of_a_vehicle_whose_time_is_old():
     # Given a vehicle that has the key, its time stamp old until it has heard the companion
-    peer = Peer(signing=Mock(is_genuine=lambda packet: False, is_signed=lambda packet: packet == HEARTBEAT))
+    peer = Peer(signing=Mock(refusal=lambda packet: "old", is_signed=lambda packet: packet == HEARTBEAT))
     peer.accepts(HEARTBEAT, VEHICLE, 0)
     # When somebody without the key sends more often
     peer.accepts(IMU, STRANGER, 1)

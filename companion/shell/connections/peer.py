@@ -89,7 +89,7 @@ class Peer:
         return self._vehicle is None or sender == self._pinned
 
     def _is_genuine(self, packet: bytes) -> bool:
-        return self._signing is None or self._signing.is_genuine(packet)
+        return self._signing is None or self._signing.refusal(packet) is None
 
     def _pin(self, sender: Address, now_us: int) -> None:
         if self._pinned is not None:

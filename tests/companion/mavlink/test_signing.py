@@ -74,7 +74,7 @@ def test_what_pymavlink_signs_is_heard_and_the_other_way_round(signing, message)
 )
 def test_what_is_not_genuine_is_refused_and_counted_by_reason(signing, reason, packets):
     for packet in packets:
-        assert not signing.is_genuine(packet)
+        assert signing.refusal(packet) == reason
         assert signing.opened(packet, NOW_US) == b""
     assert signing.refused == {reason: len(packets)}
     text = repr(signing) + repr(signing.refused)
@@ -86,7 +86,7 @@ def test_a_packet_is_heard_once_and_nothing_before_it_any_more(signing):
     first, second, third = (packed(end=end) for _ in range(3))
     assert signing.opened(second, NOW_US)
     for packet in (second, first):
-        assert not signing.is_genuine(packet) and not signing.opened(packet, NOW_US)
+        assert signing.refusal(packet) and not signing.opened(packet, NOW_US)
     assert signing.opened(third, NOW_US)
     assert signing.refused == {REPLAYED: 2}
 
