@@ -38,7 +38,6 @@ class Stepped(Generic[CoreT]):
         self.core = core
         self._decoder, self._encoder = Decoder(readers), Encoder()
         self._has_begun = self._is_addressed = False
-        self.stop_reason: str | None = None  # of the last `stop`
 
     def step(self, received: bytes, now_us: int) -> StepResult:
         """Take the bytes received since the last call, or b"" when only time has passed."""
@@ -83,7 +82,7 @@ class Stepped(Generic[CoreT]):
         """End the flight: a vehicle under control is handed to hold or land first, one that recovers from a hit once it
         is clear or when this is called again. Done when `finished`.
         """
-        self.stop_reason = self.core.stop_reason = reason
+        self.core.stop_reason = reason
 
     @property
     def stop_is_put_off(self) -> bool:
@@ -134,13 +133,9 @@ class Companion(Stepped[FlightCore]):
         """Confirm the plan, also before the first step."""
         self.core.flight.plan_confirmed = True
 
-    @property
-    def plan_is_confirmed(self) -> bool:
-        return self.core.flight.plan_confirmed
-
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
-        return self.core.state is State.READY and not self.plan_is_confirmed
+        return self.core.state is State.READY and not self.core.flight.plan_confirmed
 
     def plan_text(self) -> str:
         """The plan for a person to agree to; complete once `plan_is_ready`."""

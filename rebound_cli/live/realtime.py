@@ -277,12 +277,12 @@ def fly_realtime(companion: Companion, loop: Loop, confirm: Callable[[Companion]
         if result.events:
             recorder.record_obstacles(companion.obstacles())
             loop.console.events(result.events, companion.core.started_at_us)
-        was_confirmed, stop_reason = companion.plan_is_confirmed, companion.stop_reason
+        was_ready, stop_reason = companion.plan_is_ready(), companion.core.stop_reason
         confirm(companion)
         look_for_file(companion, recorder, now_us)
-        if companion.plan_is_confirmed and not was_confirmed:
+        if was_ready and not companion.plan_is_ready():
             recorder.record_input(now_us, "confirm")
-        if companion.stop_reason != stop_reason:
-            recorder.record_input(now_us, "stop", reason=companion.stop_reason)
+        if companion.core.stop_reason != stop_reason:
+            recorder.record_input(now_us, "stop", reason=companion.core.stop_reason)
 
     loop.run(beside)
