@@ -150,7 +150,7 @@ class Preflight:
                 self.round_trip.update(sample, now_us)
             case messages.ImuSample() if listens:
                 self.forces.append(sample.specific_force_frd_m_s2)
-                self.delivery.arrived(sample.time_boot_us, now_us)
+                self.delivery.delays_us.append((sample.time_boot_us, now_us - sample.time_boot_us))
             case messages.LocalPosition() if listens:
                 self.positions.append(sample)
             case messages.Vibration() if listens:

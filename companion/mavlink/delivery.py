@@ -20,8 +20,8 @@ class Delivery:
     lost: int = 0
     unreadable_bytes: int = 0
     signed: int = 0
+    delays_us: list[tuple[int, int]] = field(default_factory=list)  # each sample's own time, and how late it came
     _sequence: int | None = None
-    _delays_us: list[tuple[int, int]] = field(default_factory=list)
 
     def take(self, frame: bytes, vehicle: tuple[int, int]) -> None:
         """A packet, or bytes that are none."""
@@ -35,16 +35,12 @@ class Delivery:
             self.received += 1
             self.signed += has_signature(frame)
 
-    def arrived(self, stamp_us: int, now_us: int) -> None:
-        """A sample of the vehicle's own time."""
-        self._delays_us.append((stamp_us, now_us - stamp_us))
-
     @property
     def jitter_us(self) -> float | None:
         """By how much the samples' delays differ; what grows evenly is two clocks that drift apart."""
-        if len(self._delays_us) < _NUMBERS:
+        if len(self.delays_us) < _NUMBERS:
             return None
-        stamps, delays = (np.array(column, float) for column in zip(*self._delays_us, strict=True))
+        stamps, delays = (np.array(column, float) for column in zip(*self.delays_us, strict=True))
         stamps -= stamps[0]
         # The first delay is a difference of two epochs: too large a number to be fitted exactly.
         delays -= delays[0]

@@ -32,7 +32,3 @@ MODES = {
     7 << 16: Mode("STABILIZED", Pilot.HAND),
     8 << 16: Mode("RATTITUDE", Pilot.HAND),
 }
-
-
-def parts(custom_mode: int) -> tuple[int, int]:
-    return custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
