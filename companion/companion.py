@@ -141,13 +141,8 @@ class Companion(Stepped[FlightCore]):
         """The plan for a person to agree to; complete once `plan_is_ready`."""
         return plan_text(self.core.flight)
 
-    @property
-    def file_awaited(self) -> str | None:
-        """The file whose existence the mission waits for now; the companion itself opens none."""
-        return self.core.flight.file_awaited
-
     def file_is_there(self) -> None:
-        """The file that is awaited exists."""
+        """The file that the mission awaits exists; the companion itself opens none."""
         self.core.flight.file_awaited = None
 
     def obstacles(self) -> tuple[Patch, ...]:

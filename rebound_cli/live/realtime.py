@@ -89,7 +89,8 @@ class AskPerson:
 
 def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -> None:
     """For a mission that waits for a file. One of an impossible name is not there: `Path.exists` raises."""
-    if companion.file_awaited is not None and os.path.exists(companion.file_awaited):
+    file = companion.core.flight.file_awaited
+    if file is not None and os.path.exists(file):
         companion.file_is_there()
         recorder.record_input(now_us, "file")
 
