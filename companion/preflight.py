@@ -1,7 +1,4 @@
-"""Before the first flight: asks a vehicle that stands for streams and parameters, listens, and judges item by item.
-
-Good, doubtful or bad, and the exact remedy. Bytes and the time in, bytes out.
-"""
+"""Before the first flight: asks a vehicle that stands for streams and parameters, listens, and judges item by item."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -99,7 +99,6 @@ class CommandClient:
 
 def _is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
     """Whether repeating is useless. A refused disarm is final: the vehicle flies."""
-    if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
-        return True
     is_disarm = command in (messages.DISARM, messages.DISARM_BY_FORCE)
-    return is_disarm and result is CommandResult.TEMPORARILY_REJECTED
+    is_flying = is_disarm and result is CommandResult.TEMPORARILY_REJECTED
+    return is_flying or result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED)
