@@ -22,7 +22,7 @@ class Mode:
     """`name`: as the autopilot's own tools print it. `is_guarded`: a guard may take it over by default."""
 
     name: str
-    pilot: Pilot
+    pilot: Pilot | None
     is_guarded: bool = False
 
 
@@ -78,20 +78,12 @@ class Autopilot:
     stick_deadzone: float  # deflection around the middle that asks for no climb, by default
     stick_override: float  # change of a deflection by which a pilot takes over, by default
 
-    def pilot(self, custom_mode: int) -> Pilot | None:
-        """None of a mode that is not known."""
-        mode = self._mode(custom_mode)
-        return None if mode is None else mode.pilot
-
-    def mode_name(self, custom_mode: int) -> str:
-        """For example OFFBOARD or AUTO.LAND."""
-        mode = self._mode(custom_mode)
-        return f"mode {self.mode_parameters(custom_mode)[0]}" if mode is None else mode.name
+    def mode(self, custom_mode: int) -> Mode:
+        """One that is not known has a number for its name, and no pilot."""
+        known = self.modes.get(custom_mode) or self.modes.get(custom_mode & self.mode_mask)
+        return known or Mode(f"mode {self.mode_parameters(custom_mode)[0]}", None)
 
     def set_mode(self, custom_mode: int) -> VehicleCommand:
         """MAV_CMD_DO_SET_MODE, whose first parameter says that a custom mode follows."""
         parameters = (1, *self.mode_parameters(custom_mode))
-        return VehicleCommand(176, parameters, f"mode {self.mode_name(custom_mode)}", custom_mode)
-
-    def _mode(self, custom_mode: int) -> Mode | None:
-        return self.modes.get(custom_mode) or self.modes.get(custom_mode & self.mode_mask)
+        return VehicleCommand(176, parameters, f"mode {self.mode(custom_mode).name}", custom_mode)

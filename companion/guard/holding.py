@@ -32,7 +32,7 @@ class TakeOver(Recover[GuardContext]):
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
         super().__init__(guard, now_us)
-        mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode_name(guard.previous_mode)
+        mode = "" if guard.previous_mode is None else guard.vehicle.autopilot.mode(guard.previous_mode).name
         guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
         self._began_us, self._trajectory_began_us = now_us, guard.trajectory_us
         if guard.command_client.requested_mode != guard.vehicle.autopilot.setpoints:
@@ -56,7 +56,7 @@ class TakeOver(Recover[GuardContext]):
             return Transition(Trigger.NOT_CONFIRMED, outcome.text)
         # A late step is no refusal: the answer may not have been read yet.
         if guard.trajectory_us - self._trajectory_began_us > guard.config.confirm_within_s * 1e6:
-            name = guard.vehicle.autopilot.mode_name(guard.vehicle.autopilot.setpoints)
+            name = guard.vehicle.autopilot.mode(guard.vehicle.autopilot.setpoints).name
             return Transition(Trigger.NOT_CONFIRMED, f"{name} not seen within {guard.config.confirm_within_s:g} s")
         return None
 
@@ -94,7 +94,7 @@ class GiveBack(GiveAway[GuardContext]):
         autopilot = guard.vehicle.autopilot
         heard_us = guard.others_setpoint_us if self.wish == autopilot.setpoints else guard.sticks_us
         streams = now_us - heard_us < OTHERS_STOPPED_US
-        may_wait = autopilot.pilot(self.wish) is not Pilot.AUTOPILOT and inputs.stop_reason is None
+        may_wait = autopilot.mode(self.wish).pilot is not Pilot.AUTOPILOT and inputs.stop_reason is None
         if may_wait and streams and silent_position(guard) is None:
             return True
         self._wishes.pop(0)
@@ -157,12 +157,12 @@ def leads_into(guard: GuardContext, mode: int) -> str | None:
     if mode == autopilot.hold or not guard.collisions:
         return None
     contact = guard.collisions[-1].contact
-    if autopilot.pilot(mode) is not Pilot.AUTOPILOT:
+    if autopilot.mode(mode).pilot is not Pilot.AUTOPILOT:
         pushed = -along(_sticks_ned(guard), contact.normal_ned) > autopilot.stick_deadzone
         return "the sticks push on into what was hit: release them" if pushed else None
     if -along(contact.velocity_ned_m_s, contact.normal_ned) < LEAST_SPEED_M_S:
         return None
-    name = autopilot.mode_name(mode)
+    name = autopilot.mode(mode).name
     return f"{name} goes on into what was hit: change it and choose it again, or choose another mode"
 
 

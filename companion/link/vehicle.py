@@ -156,7 +156,7 @@ class Vehicle:
     def count_mode(self, report: messages.CurrentMode, failsafe: bool = False) -> None:
         """It is the vehicle's from now on."""
         self.mode, self.is_failsafe_mode = report, failsafe
-        self.pilot = self.autopilot.pilot(report.custom_mode)
+        self.pilot = self.autopilot.mode(report.custom_mode).pilot
 
     def _update_armed(self, armed: bool) -> None:
         is_on_ground = self.landed is messages.LandedState.ON_GROUND
@@ -190,7 +190,7 @@ class Vehicle:
 
     @property
     def mode_name(self) -> str:
-        return "" if self.mode is None else self.autopilot.mode_name(self.mode.custom_mode)
+        return "" if self.mode is None else self.autopilot.mode(self.mode.custom_mode).name
 
     @property
     def flies_setpoints(self) -> bool:

@@ -59,7 +59,7 @@ def would_move(packet: bytes, autopilot: Autopilot) -> bool:
         # A program's look like a pilot's, for whom the guard stands down.
         return source_of(packet)[1] in _ON_BOARD
     if message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
-        return autopilot.pilot(fields_of(packet)["custom_mode"]) is Pilot.SETPOINTS
+        return autopilot.mode(fields_of(packet)["custom_mode"]).pilot is Pilot.SETPOINTS
     if message_id in _ITEMS:
         # ArduPilot's older way to be sent somewhere, as DroneKit's simple_goto has it: 2 is a place, 3 a height.
         return fields_of(packet)["current"] in (2, 3)

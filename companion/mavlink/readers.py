@@ -292,9 +292,8 @@ def _vehicle_text(severity: int, text: bytes) -> Sample | None:
 
 
 def _autopilot_version(flight_sw_version: int) -> Sample:
-    # major, minor, patch, type: one byte each, from the top
-    version = flight_sw_version
-    return messages.AutopilotVersion((version >> 24 & 0xFF, version >> 16 & 0xFF, version >> 8 & 0xFF))
+    major, minor, patch, _type = flight_sw_version.to_bytes(4, "big")
+    return messages.AutopilotVersion((major, minor, patch))
 
 
 def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) -> Sample:

@@ -81,7 +81,7 @@ def test_a_mode_that_the_vehicle_is_about_to_be_in_says_who_flies_it():
 def is_meant(mode, *samples, now_us=0, landed=LandedState.IN_AIR):
     guard = GuardCore(GuardConfig()).flight
     guard.vehicle.mode, guard.vehicle.landed = CurrentMode(mode, None), landed
-    guard.vehicle.pilot = PX4.pilot(mode)
+    guard.vehicle.pilot = PX4.mode(mode).pilot
     observe(guard, samples, 0)
     return goes_down(guard, now_us)
 

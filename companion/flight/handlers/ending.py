@@ -249,7 +249,7 @@ class HandOver(GiveAway[FlightContext]):
         if outcome is None:
             return False
         if outcome.succeeded:
-            flight.report(now_us, "mode", f"handed over to {flight.vehicle.autopilot.mode_name(self._mode)}")
+            flight.report(now_us, "mode", f"handed over to {flight.vehicle.autopilot.mode(self._mode).name}")
         elif outcome.refused and self._mode == flight.vehicle.autopilot.hold:
             # PX4 holds only with a global position; without one (motion capture alone) it still lands.
             self._mode = flight.vehicle.autopilot.land

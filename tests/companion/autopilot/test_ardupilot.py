@@ -228,8 +228,8 @@ def test_modes_have_copters_names_and_numbers():
     assert {number: mode.name for number, mode in modes.MODES.items()}.items() <= {
         (number, name) for name, number in theirs.items()
     }
-    assert ARDUPILOT.mode_name(99) == "mode 99" and ARDUPILOT.pilot(99) is None
-    flown_by = {name: ARDUPILOT.pilot(theirs[name]) for name in ("STABILIZE", "AUTO", "LOITER", "GUIDED")}
+    assert ARDUPILOT.mode(99).name == "mode 99" and ARDUPILOT.mode(99).pilot is None
+    flown_by = {name: ARDUPILOT.mode(theirs[name]).pilot for name in ("STABILIZE", "AUTO", "LOITER", "GUIDED")}
     assert [*flown_by.values()] == [Pilot.HAND, Pilot.AUTOPILOT, Pilot.STICKS, Pilot.SETPOINTS]
 
 

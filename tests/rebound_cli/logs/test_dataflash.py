@@ -175,7 +175,7 @@ def test_events_arm_and_land(tmp_path):
 def test_modes_are_those_of_px4_that_do_the_same(tmp_path):
     rows = [("MODE", 1_000_000 + number, number, number, 1) for number in (0, 16, 17)]
     beats = of(read(tmp_path, [COPTER, *IMU, *rows]), Heartbeat)
-    assert [PX4.mode_name(beat.custom_mode) for beat in beats] == ["STABILIZED", "POSCTL", "AUTO.LOITER"]
+    assert [PX4.mode(beat.custom_mode).name for beat in beats] == ["STABILIZED", "POSCTL", "AUTO.LOITER"]
 
 
 def test_the_climb_rate_the_samples_and_the_frame_are_those_of_the_first_sensor(tmp_path):
