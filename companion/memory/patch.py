@@ -51,10 +51,6 @@ class Patch(StrictModel):
         return math.radians(self.normal_error_deg)
 
     @property
-    def hits(self) -> int:
-        return len(self.touches_ned_m)
-
-    @property
     def is_steep(self) -> bool:
         """Whether it is no wall but a ceiling, a floor or a roof."""
         return self.normal_ned[2] != 0.0
@@ -186,7 +182,7 @@ def joined(patches: Sequence[Patch], touch: Patch) -> Patch:
     """The touch and the patches of its surface as one; the normal by the means, then by places that lie far apart."""
     parts, normal = [*patches, touch], ZERO
     for part in parts:
-        normal = plus(normal, part.hits / max(part.normal_error_rad, 1e-3) ** 2, part.normal_ned)
+        normal = plus(normal, len(part.touches_ned_m) / max(part.normal_error_rad, 1e-3) ** 2, part.normal_ned)
     patch = Patch.model_construct(
         touches_ned_m=tuple(place for part in parts for place in part.touches_ned_m),
         normal_ned=unit(normal),

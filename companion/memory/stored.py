@@ -54,7 +54,8 @@ def _rounded(value: Any) -> Any:
 def describe(patch: Patch) -> str:
     """For people: what, where, how much of it."""
     n, e, d = patch.centre_ned_m
-    hits = "touched once" if patch.hits == 1 else f"touched {patch.hits} times"
+    count = len(patch.touches_ned_m)
+    hits = "touched once" if count == 1 else f"touched {count} times"
     place = f"[{n:z.2f}, {e:z.2f}, {d:z.2f}]"
     north, east, down = patch.normal_ned
     if patch.is_steep:

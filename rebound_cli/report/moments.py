@@ -92,7 +92,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
 def _normal(flight: ShownFlight, finding: Finding) -> Normal:
     """As the memory of this touch has it; before one is made, by the contact alone."""
     for patch in flight.patches:
-        if patch.found_at_us == finding.at_us and patch.hits == 1:
+        if patch.found_at_us == finding.at_us and len(patch.touches_ned_m) == 1:
             return Normal(patch.normal_ned, patch.normal_error_rad)
     return finding.final.normal
 

@@ -94,7 +94,7 @@ def test_the_surface_is_a_guards_reach_ahead_of_the_centre_or_behind_one_that_it
 def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
     (patch,) = around().joined([wall(0.0), wall(1.05)]).patches
     low_m, high_m = patch.assumed_along_m()
-    assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
+    assert len(patch.touches_ned_m) == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
 
 
 def test_the_places_give_a_better_normal_than_the_pushes():
@@ -138,7 +138,7 @@ def test_a_patch_comes_back_from_a_file_as_it_was():
     known = around().joined([wall(0.0), wall(1.05), wall(0.0, normal=turned(90.0))]).patches
     stored = ObstacleFile.model_validate({"patches": [as_data(patch) for patch in known]})
     for before, patch in zip(known, stored.patches, strict=True):
-        assert patch.hits == before.hits and patch.found_at_us == before.found_at_us
+        assert len(patch.touches_ned_m) == len(before.touches_ned_m) and patch.found_at_us == before.found_at_us
         assert patch.normal_ned == pytest.approx(before.normal_ned, abs=1e-3)
         assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
         # and a second time to the last digit
