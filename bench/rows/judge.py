@@ -76,7 +76,7 @@ def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator
             if goal is not None:
                 off_m = float(np.linalg.norm((_place(flight, following) - goal)[~np.isnan(goal)]))
                 if off_m > REACHED_M:
-                    yield f"item {step.label} ({step.name}) ended {off_m:.2f} m beside its goal"
+                    yield f"item {step.label} ({step.item.name}) ended {off_m:.2f} m beside its goal"
     last = next((event for event in reversed(told) if event.kind == "landing"), None)
     if last is not None and told[-1].kind == "done":
         end = flight.truth.series["position_ned_m"][-1, :2]

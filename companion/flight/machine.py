@@ -116,7 +116,7 @@ class FlightCore(Core[FlightContext]):
         flight = self.flight
         expectations.review(flight, now_us, is_over=True)
         failure = expectations.failure(flight)
-        left = "" if flight.step.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
+        left = "" if flight.step.item.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
         flight.outcome = "completed" if failure is None else "failed"
         flight.reason = failure or f"landed and disarmed{left}"
         count = len(flight.collisions)

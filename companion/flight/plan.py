@@ -143,8 +143,7 @@ def _law(recovery: RecoveryConfig) -> str:
 
 def _fastest_m_s(mission: Mission) -> float:
     flight, actions = mission.companion.flight, [step.action for step in items.program(mission.items)]
-    moving = [action for action in actions if hasattr(action, "speed_m_s") or isinstance(action, items.VelocityItem)]
-    speeds = [items.speed_m_s(action) or flight.cruise_speed_m_s for action in moving]
+    speeds = [action.speed_m_s or flight.cruise_speed_m_s for action in actions if hasattr(action, "speed_m_s")]
     return max(speeds, default=flight.takeoff_speed_m_s)
 
 

@@ -38,8 +38,8 @@ class SpeedLimits:
         return cls(speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
 
     def changed_to(self, item: items.SetSpeedItem) -> "SpeedLimits":
-        acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
-        return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration)
+        acceleration_m_s2 = item.acceleration_m_s2 or self.acceleration_m_s2
+        return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration_m_s2)
 
     def against(self, wind_m_s2: Vector3, way: Vector3) -> "SpeedLimits":
         """With the acceleration that a head wind leaves; `wind_m_s2`: what balances the wind in hover, horizontal."""
@@ -49,7 +49,7 @@ class SpeedLimits:
 
     def limits(self, item: items.Motion | items.ReturnItem) -> tuple[float, float, float]:
         """Speed and acceleration, the item's or the present ones; and the acceleration while the speed grows."""
-        speed_m_s = items.speed_m_s(item) or self.speed_m_s
+        speed_m_s = item.speed_m_s or self.speed_m_s
         slowed_m_s = max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
         return slowed_m_s, getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
 
@@ -171,8 +171,7 @@ def _turn_by_turn(item: items.OrbitItem, start_m: Vector3, speeds: SpeedLimits, 
 
 def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """Up first where that is asked for, then straight to above the arming position, never above the fence; round known
-    obstacles, also above the vehicle.
-    """
+    obstacles, also above the vehicle."""
     wanted_m = max(-start_m[2], item.height_m or 0.0)
     down_m = -min(max(wanted_m, known.fence.min_height_m), known.fence.max_height_m)
     up, home, limits = (start_m[0], start_m[1], down_m), (0.0, 0.0, down_m), speeds.limits(item)

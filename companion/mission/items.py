@@ -122,12 +122,9 @@ class ExpectItem(SomeKeys):
 
 
 # PX4 flies no faster: a larger wish is a slip of the pen.
-MAX_SPEED_M_S = defaults.MAX_SPEED_M_S
+Speed = Annotated[Positive, Field(le=defaults.MAX_SPEED_M_S)]
 # One g sideways is a tilt of 45 degrees, PX4's default limit.
-MAX_ACCELERATION_M_S2 = 9.81
-
-Speed = Annotated[Positive, Field(le=MAX_SPEED_M_S)]
-Acceleration = Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)]
+Acceleration = Annotated[Positive, Field(le=9.81)]
 Yaw = Annotated[Number, Field(ge=-360.0, le=360.0)]
 
 
@@ -166,9 +163,15 @@ class VelocityItem(StrictModel):
     @model_validator(mode="after")
     def _moves(self) -> Self:
         speed_m_s = sum(component**2 for component in self.velocity_ned_m_s) ** 0.5
-        if not 0.0 < speed_m_s <= MAX_SPEED_M_S:
-            raise ValueError(f"velocity_ned_m_s: {speed_m_s:g} m/s is not above 0 and at most {MAX_SPEED_M_S:g}")
+        most_m_s = defaults.MAX_SPEED_M_S
+        if not 0.0 < speed_m_s <= most_m_s:
+            raise ValueError(f"velocity_ned_m_s: {speed_m_s:g} m/s is not above 0 and at most {most_m_s:g}")
         return self
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the velocity; other items may leave theirs open."""
+        return math.hypot(*self.velocity_ned_m_s)
 
 
 class PathItem(StrictModel):
@@ -274,14 +277,6 @@ Action: TypeAlias = (
 )
 
 
-def speed_m_s(action: Action) -> float | None:
-    """The one that it asks for by itself, of whatever has one."""
-    if isinstance(action, VelocityItem):
-        return math.hypot(*action.velocity_ned_m_s)
-    speed: float | None = getattr(action, "speed_m_s", None)
-    return speed
-
-
 # A mission longer than this once its repeats are written out is a slip of the pen.
 MOST_STEPS = 10_000
 
@@ -359,10 +354,6 @@ class MissionItem(StrictModel):
         return action
 
 
-# Now that there is what it is made of.
-RepeatItem.model_rebuild()
-
-
 @dataclass(frozen=True, slots=True)
 class Step:
     """`label` is the item's number as people count, "4.2 (2 of 3)" for the second lap of a repeat.
@@ -374,10 +365,6 @@ class Step:
     label: str
     item: MissionItem
     action: Action
-
-    @property
-    def name(self) -> str:
-        return self.item.name
 
 
 def program(items: tuple[MissionItem, ...]) -> tuple[Step, ...]:

@@ -65,7 +65,7 @@ class Mission(StrictModel):
             raise ValueError(f"items: the first item must be takeoff, not {names[0]}")
         if names[-1] not in ("land", "return"):
             raise ValueError(f"items: the last item must be land or return, not {names[-1]}")
-        for leg in _legs(self):
+        for leg in itinerary(self, is_as_written=True):
             # A repeat's laps mostly go the same ways.
             complaint = None if (id(leg.step.action), leg.start_ned_m) in seen else self._complaint(leg)
             if complaint is not None:
@@ -76,16 +76,15 @@ class Mission(StrictModel):
 
     def _complaint(self, leg: "Leg") -> str | None:
         """What is wrong with a step as it is written, or None."""
-        name, number, limit_m_s = leg.step.name, leg.step.label.partition(" ")[0], self.limits.max_speed_m_s
+        name, number, limit_m_s = leg.step.item.name, leg.step.label.partition(" ")[0], self.limits.max_speed_m_s
         if name in ("takeoff", "land", "return") and number not in ("1", f"{len(self.items)}"):
             return f"item {number} is {name}, which may only come {'first' if name == 'takeoff' else 'last'}"
-        speed_m_s = items.speed_m_s(leg.step.action) or 0.0
+        speed_m_s = getattr(leg.step.action, "speed_m_s", None) or 0.0
         if speed_m_s > limit_m_s:
             flies = f"item {number} ({name}) flies at {speed_m_s:g} m/s"
             return f"{flies}, above limits.max_speed_m_s = {limit_m_s:g}"
         assert leg.trajectory is not None, "nothing is in its way"
-        complaint = self.fence.complaint(leg.trajectory.target_m)
-        if complaint is not None:
+        if (complaint := self.fence.complaint(leg.trajectory.target_m)) is not None:
             return f"the position of item {number} ({name}) {complaint}"
         # On the way up from the ground only the end can be wrong.
         complaint = None if name == "takeoff" else _trajectory_complaint(self.fence, leg.trajectory)
@@ -116,11 +115,6 @@ class Leg:
     is_detour: bool
 
 
-def itinerary(mission: Mission) -> tuple[Leg, ...]:
-    """The mission when nothing is hit, round what is known beforehand."""
-    return tuple(_legs(mission, mission.known))
-
-
 def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     """The program, or what of it an interrupted flight has left: up, to where its step begins, and on from there.
 
@@ -132,7 +126,7 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     at = mission.resume.at_step
     if at >= len(steps):
         raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
-    begin = tuple(_legs(mission))[at]
+    begin = list(itinerary(mission, is_as_written=True))[at]
     headings = [yaw for step in steps[:at] if isinstance(yaw := getattr(step.action, "yaw_deg", None), float | int)]
     there = items.GoToItem(position_ned_m=begin.start_ned_m, yaw_deg=headings[-1] if headings else None)
     back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
@@ -140,10 +134,10 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     return (steps[0], *set_speeds, back, *steps[at:])
 
 
-def _legs(mission: Mission, known: ObstacleMap | None = None) -> Iterator[Leg]:
-    """The steps round what is known, or without that as they are written."""
+def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
+    """The mission when nothing is hit, round what is known beforehand, or without that as it is written."""
     place: Vector3 = (0.0, 0.0, 0.0)
-    known = known or replace(mission.known, patches=(), keeps_in=False)
+    known = replace(mission.known, patches=(), keeps_in=False) if is_as_written else mission.known
     flight, most_m_s = mission.companion.flight, mission.limits.max_speed_m_s
     speeds = SpeedLimits.of(flight, most_m_s)
     for step in items.program(mission.items):
@@ -168,13 +162,12 @@ def _legs(mission: Mission, known: ObstacleMap | None = None) -> Iterator[Leg]:
                 if isinstance(action.yaw_deg, float | int) and planned.trajectory is not None:
                     # It turns on its way, and after it.
                     lasts_s = max(0.0, 180.0 / defaults.TURNING_DEG_S - planned.trajectory.duration_s)
-        begins = place
         flown = planned.trajectory or stay(place)
-        place = flown.target_m
         if isinstance(action, items.ReturnItem | items.LandItem):
-            lasts_s = -place[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
+            lasts_s = -flown.target_m[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
         lasts_s = None if lasts_s is None else lasts_s + flown.duration_s
-        yield Leg(step, begins, planned.trajectory, lasts_s, planned.is_detour)
+        yield Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)
+        place = flown.target_m
 
 
 def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
@@ -188,9 +181,6 @@ def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
         name = "radius_m" if fence.polygon_ne_m is None else "polygon_ne_m"
         return f"leaves fence.{name} at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
     count = min(_MOST_LOOKS, math.ceil(trajectory.duration_s / _LOOK_EVERY_S))
-    for number in range(count):
-        position = trajectory.at(trajectory.duration_s * number / count)[0]
-        beyond_m = max(fence.outside_by_m(position), position[2] + fence.min_height_m)
-        if beyond_m > _ROUNDING_M:
-            return fence.complaint(position)
-    return None
+    places = (trajectory.at(trajectory.duration_s * number / count)[0] for number in range(count))
+    beyond = (place for place in places if max(fence.outside_by_m(place), place[2] + fence.min_height_m) > _ROUNDING_M)
+    return next(map(fence.complaint, beyond), None)

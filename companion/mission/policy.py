@@ -38,8 +38,7 @@ class AbortWhen(StrictModel):
     """Further from the setpoint than this, the vehicle is not being flown by it."""
     blind_for_s: Positive | None = 10.0
     """A detector without data for this time protects nothing. Links come back within seconds; a stream that was lost or
-    a vehicle that shakes too much does not.
-    """
+    a vehicle that shakes too much does not."""
     hit_above_m_s: Positive | None = None
     """After the recovery from a hit this hard: the airframe wants to be looked at."""
 

@@ -54,7 +54,7 @@ def planned_flight(mission: Mission, world: SimulatedWorld, legs: Sequence[Flown
             events.append(_event(met_us, "meets", flown.meets.name))
         north, east, down = flown.points_ned_m[-1].tolist()
         lasts_s = _UNKNOWN_S if flown.leg.lasts_s is None else flown.leg.lasts_s
-        add(lasts_s, (north, east, 0.0 if step.name in ("land", "return") else down), (0.0, 0.0, 0.0))
+        add(lasts_s, (north, east, 0.0 if step.item.name in ("land", "return") else down), (0.0, 0.0, 0.0))
         at_us += round(lasts_s * 1e6)
     return ShownFlight(
         name=mission.name,

@@ -81,7 +81,7 @@ class FlyItems(_OnTrajectory):
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
-        flight.report(now_us, "item", text, number=number, name=step.name, step=step.index)
+        flight.report(now_us, "item", text, number=number, name=step.item.name, step=step.index)
         if isinstance(self._action, items.ExpectItem):
             expectations.begin(flight, step.label, self._action, now_us)
         elif isinstance(self._action, items.Motion):
@@ -138,7 +138,7 @@ class FlyItems(_OnTrajectory):
             return Transition(_TRIGGERS[wanted], damage.text)
         while True:
             if isinstance(self._action, items.ReturnItem | items.LandItem):
-                return Transition(_TRIGGERS[flight.step.name])
+                return Transition(_TRIGGERS[flight.step.item.name])
             is_cut_off = bool(self._out_of_reach)
             if is_cut_off:
                 policy = flight.mission.obstacles.on_unreachable

@@ -312,7 +312,7 @@ def test_what_is_left_is_flown_from_where_its_step_begins():
     items = [TAKEOFF, {"set_speed": {"speed_m_s": 1.0, "acceleration_m_s2": 1.0}}, turned, *ITEMS[1:]]
     steps = steps_to_fly(mission(items=items, resume={"at_step": 6, **FIRST, "armed_boot_us": 0}))
     # The acceleration of the first one still holds, and the heading
-    assert [step.name for step in steps] == ["takeoff", *["set_speed"] * 2, *["go_to"] * 4, "land"]
+    assert [step.item.name for step in steps] == ["takeoff", *["set_speed"] * 2, *["go_to"] * 4, "land"]
     assert [step.index for step in steps] == [0, 6, 6, 6, 6, 7, 8, 9]
     # step 6 leads from [3, 2] to [3, 0]
     assert (steps[3].action.position_ned_m, steps[3].action.yaw_deg) == ((3.0, 2.0, -1.5), 90.0)
