@@ -176,7 +176,7 @@ class FlightContext:
         config = self.mission.companion
         self.reflex = Reflex(config, self.mission.recovery, config.settled)
         self.streams = StreamMonitor(config.streams, tuple(self.reflex.monitor.detector.losses))
-        self.speeds = SpeedLimits.of(config.flight, self.mission.limits.max_speed_m_s)
+        self.speeds = self.mission.speeds
         self.steps = steps_to_fly(self.mission)
         self.known = self.mission.known
 

@@ -9,7 +9,6 @@ from companion.fence import Fence
 from companion.memory.surroundings import ROUNDING_M, ObstacleMap, route
 from companion.messages import Vector3
 from companion.mission import items
-from companion.mission.config import FlightConfig
 from companion.mission.trajectory import LEAST_GAP_M, Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
 from companion.motion.vector import along, flat, minus, plus, unit
 
@@ -31,12 +30,6 @@ class SpeedLimits:
     factor: float = 1.0
     speeding_up_m_s2: float = math.inf
 
-    @classmethod
-    def of(cls, config: FlightConfig, most_m_s: float) -> "SpeedLimits":
-        """With which a mission begins whose setpoints are no faster than `most_m_s`."""
-        speed_m_s = min(config.cruise_speed_m_s, most_m_s)
-        return cls(speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
-
     def changed_to(self, item: items.SetSpeedItem) -> "SpeedLimits":
         acceleration_m_s2 = item.acceleration_m_s2 or self.acceleration_m_s2
         return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration_m_s2)
@@ -52,12 +45,6 @@ class SpeedLimits:
         speed_m_s = item.speed_m_s or self.speed_m_s
         slowed_m_s = max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
         return slowed_m_s, getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
-
-
-def climb(start_m: Vector3, height_m: float, config: FlightConfig, most_m_s: float) -> LineProfile:
-    """Straight up, no faster than `most_m_s`."""
-    top, speed_m_s = (start_m[0], start_m[1], -height_m), min(config.takeoff_speed_m_s, most_m_s)
-    return LineProfile(start_m, top, speed_m_s, config.takeoff_acceleration_m_s2)
 
 
 def stay(place_m: Vector3) -> LineProfile:

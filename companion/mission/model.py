@@ -17,7 +17,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, stay, trajectory_around
+from companion.mission.item_trajectory import Planned, SpeedLimits, home_around, stay, trajectory_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, OnCollision, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -57,6 +57,19 @@ class Mission(StrictModel):
         """What is known of the surroundings beforehand."""
         reach_m, margin_m = self.companion.estimate.reach_m, self.obstacles.margin_m
         return ObstacleMap(self.obstacles.known, self.fence, reach_m, margin_m)
+
+    @property
+    def speeds(self) -> SpeedLimits:
+        """With which it begins."""
+        flight = self.companion.flight
+        speed_m_s = min(flight.cruise_speed_m_s, self.limits.max_speed_m_s)
+        return SpeedLimits(speed_m_s, flight.cruise_acceleration_m_s2, speeding_up_m_s2=flight.speeding_up_m_s2)
+
+    def climb(self, start_ned_m: Vector3, height_m: float) -> LineProfile:
+        """Straight up."""
+        flight, top_ned_m = self.companion.flight, (start_ned_m[0], start_ned_m[1], -height_m)
+        speed_m_s = min(flight.takeoff_speed_m_s, self.limits.max_speed_m_s)
+        return LineProfile(start_ned_m, top_ned_m, speed_m_s, flight.takeoff_acceleration_m_s2)
 
     @model_validator(mode="after")
     def _can_be_flown(self) -> Self:
@@ -138,14 +151,13 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
     """The mission when nothing is hit, round what is known beforehand, or without that as it is written."""
     place: Vector3 = (0.0, 0.0, 0.0)
     known = replace(mission.known, patches=(), keeps_in=False) if is_as_written else mission.known
-    flight, most_m_s = mission.companion.flight, mission.limits.max_speed_m_s
-    speeds = SpeedLimits.of(flight, most_m_s)
+    speeds = mission.speeds
     for step in items.program(mission.items):
         action, planned = step.action, Planned(stay(place))
         lasts_s: float | None = 0.0
         match action:
             case items.TakeoffItem():
-                planned = Planned(climb(place, action.height_m, flight, most_m_s))
+                planned = Planned(mission.climb(place, action.height_m))
             case items.HoldItem():
                 lasts_s = action.duration_s
             case items.WaitForItem():

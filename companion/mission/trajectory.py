@@ -172,8 +172,6 @@ class CurveProfile:
                 points.append(point)
         self.target_m = points[-1]
         self.distance_m = self.duration_s = 0.0
-        # Each point, and when it is passed.
-        self.passes = [(0.0, self.target_m)]
         if len(points) > 1:
             self._plan(points)
 
@@ -200,6 +198,7 @@ class CurveProfile:
         speeds = self._speeds(first / rate[:, None], pieces_m)
         times_s = np.concatenate([[0.0], np.cumsum(2.0 * pieces_m / (speeds[1:] + speeds[:-1]))])
         self.distance_m, self.duration_s = float(along_m[-1]), float(times_s[-1])
+        # Each point, and when it is passed.
         self.passes = list(zip(np.interp(knots, u, times_s).tolist(), points_m, strict=True))
         self._tabulate(spline, u, along_m, speeds, times_s)
 

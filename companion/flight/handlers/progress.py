@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Handler, Inputs, StepTally, Target, Transition
-from companion.flight.handlers.takeoff_and_landing import climb_to, rests
+from companion.flight.handlers.takeoff_and_landing import rests
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -72,7 +72,7 @@ class FlyItems(_OnTrajectory):
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
-                self._trajectory = climb_to(flight, self._action.height_m, start)
+                self._trajectory = flight.mission.climb(start, self._action.height_m)
             case items.WaitForItem(file=file):
                 flight.file_awaited = file
             case items.SetSpeedItem():

@@ -7,7 +7,6 @@ from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
 from companion.messages import ARM, Vector3, take_off
-from companion.mission.item_trajectory import climb
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.settling import Lasting
@@ -92,7 +91,7 @@ class TakeOff(Handler[FlightContext]):
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
         ground, boot_us = mean_position(flight), flight.latest.time_boot_us
         flight.origin_ned_m = origin_of(flight, ground, boot_us, now_us)
-        self._profile = climb_to(flight, self._item.height_m - ground[2], ground)
+        self._profile = flight.mission.climb(ground, self._item.height_m - ground[2])
         text = f"armed at {as_text(ground)}, climbing to {self._item.height_m:g} m"
         flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=boot_us)
         return None
@@ -117,11 +116,6 @@ class TakeOff(Handler[FlightContext]):
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
             return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time")
         return None
-
-
-def climb_to(flight: FlightContext, height_m: float, start_m: Vector3) -> LineProfile:
-    """Straight up, as fast as the mission has it."""
-    return climb(start_m, height_m, flight.mission.companion.flight, flight.mission.limits.max_speed_m_s)
 
 
 def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us: int) -> Vector3:
