@@ -157,11 +157,10 @@ def _item_lines(number: str, item: items.MissionItem, lead: str = "") -> list[st
     return [f"{lead:<10} {number} {describe_item(item.action)}" + (f" ({modifiers})" if modifiers else "")]
 
 
-def _resume_lines(flight: FlightContext) -> list[str]:
-    resume = flight.mission.resume
-    if resume is None:
+def _resume_lines(mission: Mission) -> list[str]:
+    if mission.resume is None:
         return []
-    label = next(step.label for step in reversed(flight.steps) if step.index == resume.at_step)
+    label = items.program(mission.items)[mission.resume.at_step].label
     return [f"Resumes    at item {label}, in the first flight's coordinates unless the vehicle was restarted since"]
 
 
@@ -177,7 +176,7 @@ def plan_text(flight: FlightContext) -> str:
         f"Vehicle    {flight.vehicle.autopilot_text()}, "
         + (f"{identity.vehicle_type}, system {identity.system_id}" if identity else "not connected"),
         f"Checks     disarmed, on the ground, round trip {trip}, streams: {rates}",
-        *_resume_lines(flight),
+        *_resume_lines(mission),
         *mission_lines(mission, flight.vehicle.autopilot),
         "Pilot      any mode change or disarm by the pilot ends the flight; the companion does not come back",
     ]

@@ -94,8 +94,7 @@ class Mission(StrictModel):
             return f"item {number} is {name}, which may only come {'first' if name == 'takeoff' else 'last'}"
         speed_m_s = getattr(leg.step.action, "speed_m_s", None) or 0.0
         if speed_m_s > limit_m_s:
-            flies = f"item {number} ({name}) flies at {speed_m_s:g} m/s"
-            return f"{flies}, above limits.max_speed_m_s = {limit_m_s:g}"
+            return f"item {number} ({name}) flies at {speed_m_s:g} m/s, above limits.max_speed_m_s = {limit_m_s:g}"
         assert leg.trajectory is not None, "nothing is in its way"
         if (complaint := self.fence.complaint(leg.trajectory.target_m)) is not None:
             return f"the position of item {number} ({name}) {complaint}"
