@@ -145,14 +145,12 @@ def touch_of(
         return None
     is_fast = math.hypot(*velocity_ned_m_s) >= LEAST_SPEED_M_S
     is_behind = is_from_behind(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s)))
-    surface_ned_m = plus(centre_ned_m, -reach_m, normal.direction_ned)
-    reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     # Not validated: an estimate that has run away must not stop the flight here.
     return Patch.model_construct(
-        touches_ned_m=(surface_ned_m,),
+        touches_ned_m=(plus(centre_ned_m, -reach_m, normal.direction_ned),),
         normal_ned=normal.direction_ned,
         normal_error_deg=min(math.degrees(normal.error_rad), 90.0),
-        reaches_m=reaches_m,
+        reaches_m=REACHES_M if is_fast and not is_behind else 0.0,
         found_at_us=found_at_us,
     )
 
