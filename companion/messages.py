@@ -316,6 +316,9 @@ class AttitudeSetpoint(Outgoing):
     yaw_rate_rad_s: float
 
 
+Setpoint: TypeAlias = PositionSetpoint | AttitudeSetpoint
+
+
 @dataclass(frozen=True, slots=True)
 class OnboardHeartbeat(Outgoing):
     """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""

@@ -14,15 +14,7 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.surroundings import ObstacleMap
-from companion.messages import (
-    AttitudeSetpoint,
-    CommandAck,
-    CurrentMode,
-    LocalPosition,
-    Outgoing,
-    PositionSetpoint,
-    Vector3,
-)
+from companion.messages import CommandAck, CurrentMode, LocalPosition, Outgoing, PositionSetpoint, Setpoint, Vector3
 from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, Step
 from companion.mission.items import Motion as MotionItem
@@ -57,7 +49,7 @@ class Target:
         """The position alone, which PX4 can hold without further setpoints."""
         return Target(self.position_ned_m, self.yaw_rad)
 
-    def setpoint(self, time_us: int) -> PositionSetpoint | AttitudeSetpoint:
+    def setpoint(self, time_us: int) -> Setpoint:
         if self.lean is not None and self.acceleration_ned_m_s2 is not None:
             return self.lean.setpoint(time_us, self.acceleration_ned_m_s2)
         velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2

@@ -20,15 +20,7 @@ from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.vehicle_update import note_height, update_vehicle
 from companion.link.commands import CommandClient
-from companion.messages import (
-    CommandAck,
-    LocalPosition,
-    MotorOutputs,
-    OnboardHeartbeat,
-    Outgoing,
-    PositionSetpoint,
-    Sample,
-)
+from companion.messages import CommandAck, LocalPosition, MotorOutputs, OnboardHeartbeat, Outgoing, Sample
 from companion.motion.resets import PLACES, Resets
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import AWAY_M_S2, HELD_S, LEAD_S, NOTICED_S
@@ -314,9 +306,10 @@ class Core(ABC, Generic[FlightT]):
         if place_m is None:
             return tilts
         n, e, _ = plus(latest.position_ned_m, place_m, (north, east, 0.0))
-        place, around = (n, e, target.position_ned_m[2]), Surroundings(None, flight.origin_ned_m, self._has_floor)
-        kept, _ = bounded(Target(place, None), around, flight.mission.fence, flight.mission.limits)
-        return (*tilts, (until_s, self.resets.sent(PositionSetpoint(now_us, kept.position_ned_m, None))))
+        last = Target((n, e, target.position_ned_m[2]), None)
+        around = Surroundings(None, flight.origin_ned_m, self._has_floor)
+        kept, _ = bounded(last, around, flight.mission.fence, flight.mission.limits)
+        return (*tilts, (until_s, self.resets.sent(kept.setpoint(now_us))))
 
     def _repeated(self, word: Outgoing, held_s: float, until_s: float) -> tuple[tuple[float, Outgoing], ...]:
         """Twice as often as it has to be: a lost word ends nothing."""

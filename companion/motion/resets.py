@@ -13,10 +13,10 @@ from companion.messages import (
     AttitudeSetpoint,
     LocalPosition,
     Odometry,
-    PositionSetpoint,
     PositionTarget,
     Refused,
     Sample,
+    Setpoint,
     Vector3,
 )
 from companion.motion.config import CURRENT_US, STAMP_RESOLUTION_US
@@ -80,7 +80,7 @@ class Resets:
             self.shift_ned_m = self._shifts.get(sample.reset_counter, shift)
             self._latest, self._first, self._place = sample, None, None
 
-    def sent(self, setpoint: PositionSetpoint | AttitudeSetpoint) -> PositionSetpoint | AttitudeSetpoint:
+    def sent(self, setpoint: Setpoint) -> Setpoint:
         """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
         if self.shift_ned_m == ZERO or isinstance(setpoint, AttitudeSetpoint):
             return setpoint
