@@ -277,6 +277,8 @@ class Handler(Generic[FlightT]):
     """What is done in a state; one is made each time the state is entered."""
 
     finished = False  # nothing is left to send
+    is_active = True  # as the companion's own HEARTBEAT has it
+    has_floor = True  # the fence's floor counts, and not only the ground
     _target: Target | None = None
 
     def __init__(self, flight: FlightT, now_us: int) -> None:

@@ -68,16 +68,6 @@ class Core(ABC, Generic[FlightT]):
         return True
 
     @property
-    @abstractmethod
-    def _is_active(self) -> bool:
-        """Whether the companion's own HEARTBEAT reports it as active."""
-
-    @property
-    def _has_floor(self) -> bool:
-        """Whether the fence's floor counts."""
-        return True
-
-    @property
     def _setpoint_hz(self) -> float:
         return self.flight.mission.companion.flight.setpoint_hz
 
@@ -93,9 +83,10 @@ class Core(ABC, Generic[FlightT]):
         if self._law.pending is not None or not self._is_met:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
-        if now_us >= self._heartbeat_due_us:
-            self._beat(now_us)
         flight = self.flight
+        if now_us >= self._heartbeat_due_us and not self.handler.finished:
+            self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+            flight.outbox.append(OnboardHeartbeat(self.handler.is_active))
         if flight.events or self._texts.waiting or now_us >= self._values_due_us:
             try:
                 self._inform(now_us)
@@ -237,8 +228,8 @@ class Core(ABC, Generic[FlightT]):
                 return
             # Without control the setpoint is the vehicle's own position, and is not limited.
             if holds:
-                target = limiter.passed(flight, target, self._has_floor, moved, now_us)
-            sent = limiter.in_vehicles_view(flight, target, self._has_floor, sample_us) if holds else target
+                target = limiter.passed(flight, target, self.handler.has_floor, moved, now_us)
+            sent = limiter.in_vehicles_view(flight, target, self.handler.has_floor, sample_us) if holds else target
             setpoint = sent.setpoint(now_us - self.started_at_us)
         except Exception as error:
             self.fault(error, now_us)
@@ -307,7 +298,7 @@ class Core(ABC, Generic[FlightT]):
             return tilts
         n, e, _ = plus(latest.position_ned_m, place_m, (north, east, 0.0))
         last = Target((n, e, target.position_ned_m[2]), None)
-        around = Surroundings(None, flight.origin_ned_m, self._has_floor)
+        around = Surroundings(None, flight.origin_ned_m, self.handler.has_floor)
         kept, _ = bounded(last, around, flight.mission.fence, flight.mission.limits)
         return (*tilts, (until_s, self.resets.sent(kept.setpoint(now_us))))
 
@@ -320,12 +311,6 @@ class Core(ABC, Generic[FlightT]):
     def finished(self) -> bool:
         """Ended, and the vehicle has answered the last word, or does not."""
         return self.handler.finished and self._law.pending is None
-
-    def _beat(self, now_us: int) -> None:
-        """Send the companion's HEARTBEAT until the end."""
-        if not self.handler.finished:
-            self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
-            self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
     def _inform(self, now_us: int) -> None:
         """Send the operator's texts with their events, and numbers at their rate, once a vehicle is connected."""

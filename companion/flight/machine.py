@@ -15,7 +15,7 @@ from companion.flight.handlers.progress import FlyHome, FlyItems, HoldAfterRecov
 from companion.flight.handlers.recovering import record_collision
 from companion.flight.handlers.takeoff_and_landing import Land, RecoverInOffboard, TakeOff
 from companion.flight.obstacle_map import remember
-from companion.flight.states import FINAL_STATES, IN_THE_AIR, ON_THE_WAY, TABLE, State, Trigger
+from companion.flight.states import FINAL_STATES, IN_THE_AIR, TABLE, State, Trigger
 from companion.flight.vehicle_update import situation_of
 from companion.messages import Sample
 from companion.mission.model import Mission
@@ -50,14 +50,6 @@ class FlightCore(Core[FlightContext]):
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(FlightContext(mission))
-
-    @property
-    def _is_active(self) -> bool:
-        return self.state not in FINAL_STATES and self.flight.armed_at_us is not None
-
-    @property
-    def _has_floor(self) -> bool:
-        return self.state in ON_THE_WAY
 
     def situation(self) -> Situation:
         off_state = None if self.state in IN_THE_AIR else self.state.value

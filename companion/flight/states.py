@@ -91,5 +91,3 @@ TABLE: Mapping[State, Mapping[Enum, State]] = {
 FINAL_STATES = tuple(state for state, row in TABLE.items() if not row)
 # Where hits and crashes are looked for: climb and descent belong to it; the height decides about the ground.
 IN_THE_AIR = tuple(state for state, row in TABLE.items() if Trigger.CRASHED in row)
-# Between take-off and landing, where the fence's floor counts.
-ON_THE_WAY = (State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)

@@ -72,10 +72,6 @@ class GuardCore(Core[GuardContext]):
         return self.state in HOLDING or hands_over
 
     @property
-    def _is_active(self) -> bool:
-        return self.state is not State.CONNECTING
-
-    @property
     def _setpoint_hz(self) -> float:
         return super()._setpoint_hz if self.holds else self.flight.config.lead_hz
 

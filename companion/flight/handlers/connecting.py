@@ -17,6 +17,8 @@ class Meet(Handler[FlightT], ABC):
     Of a vehicle that has restarted nothing that was measured before is valid.
     """
 
+    is_active = False
+
     def __init__(self, flight: FlightT, now_us: int) -> None:
         flight.reflex.restart(now_us)
         flight.vehicle.attitude_parameters.clear()
@@ -112,6 +114,8 @@ class Connect(Meet[FlightContext]):
 
 class Ready(Handler[FlightContext]):
     """Show the plan; nothing happens until it is confirmed."""
+
+    is_active = False
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         flight.report(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))

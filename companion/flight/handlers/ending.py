@@ -4,13 +4,13 @@ import math
 from typing import Literal
 
 from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition
-from companion.flight.states import ON_THE_WAY, State, Trigger
+from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS, CommandOutcome
 from companion.link.vehicle import OLD_NEWS_US
 from companion.messages import DISARM, LandedState, Vector3
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
-ON_SETPOINTS = (State.TAKEOFF, *ON_THE_WAY)
+ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
 
 # After a hit the setpoint jumps, and the vehicle takes its time.
 FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
@@ -216,6 +216,8 @@ class HandOver(GiveAway[FlightContext]):
     land. The setpoints stop when the command client gives up (about 2.5 s without an answer), and after LONGEST_US at
     the latest. Then PX4's own loss-of-offboard action takes over.
     """
+
+    is_active = has_floor = False
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         super().__init__(flight, now_us)

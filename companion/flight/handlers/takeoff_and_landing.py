@@ -30,6 +30,8 @@ ARRIVES_M_S = 0.2
 class TakeOff(Handler[FlightContext]):
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
+    is_active = has_floor = False
+
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         item = flight.steps[0].action
         assert isinstance(item, TakeoffItem), "the mission model sees to it"
@@ -84,6 +86,7 @@ class TakeOff(Handler[FlightContext]):
             why = flight.vehicle.said or flight.vehicle.autopilot.remedy_not_armed
             return Transition(Trigger.REFUSED, f"not armed: {outcome.text}; {why}")
         self._now = self._climb
+        self.is_active = True
         if self._is_told:
             flight.target = None
             flight.command_client.begin(take_off(self._item.height_m))
@@ -167,6 +170,8 @@ class Land(Handler[FlightContext]):
     One that is asked to land in motion lands where it comes to rest, be it outside the fence. One that is hurt, or near
     the ground, or does not know where it is, is asked at once.
     """
+
+    has_floor = False
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._started_us = now_us
