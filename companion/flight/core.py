@@ -43,12 +43,8 @@ class Core(ABC, Generic[FlightT]):
     table: ClassVar[Mapping[Any, Mapping[Any, Any]]]
     handlers: ClassVar[Mapping[Any, Callable[[Any, int], Handler[Any]]]]
     """Of all states that need no more to begin than the time."""
-    stopping: ClassVar[Enum]
-    """The trigger that gives the vehicle away."""
-    giving_away: ClassVar[tuple[Enum, ...]]
-    """States in which it is given away already."""
-    failed: ClassVar[Enum]
-    """The state after a fault in which even giving away fails."""
+    stopping: ClassVar[Enum]  # the trigger that gives the vehicle away; a state without it has given it away already
+    failed: ClassVar[Enum]  # the state after a fault in which even giving away fails
     state: Any
 
     def __init__(self, flight: FlightT) -> None:
@@ -107,7 +103,7 @@ class Core(ABC, Generic[FlightT]):
         place = traceback.extract_tb(error.__traceback__)[-1]
         text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
         flight.report(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
-        if flight.fault or self.state in self.giving_away:
+        if flight.fault or self.stopping not in self.table[self.state]:
             self._release(text)
         flight.fault = text
         try:
@@ -183,7 +179,7 @@ class Core(ABC, Generic[FlightT]):
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
         flight = self.flight
         self.handler = Released(flight, self.now_us)
-        if self.state not in self.giving_away or flight.outcome is None:
+        if self.stopping in self.table[self.state] or flight.outcome is None:
             self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
     def _take(self, transition: Transition, now_us: int) -> bool:

@@ -43,7 +43,6 @@ class FlightCore(Core[FlightContext]):
     table = TABLE
     handlers = HANDLERS
     stopping = Trigger.INTERRUPTED
-    giving_away = FINAL_STATES
     failed = State.ABORTED
     state: State = State.CONNECT
     _away_us: int | None = None  # since when the vehicle has not followed, as far as that is dealt with

@@ -57,7 +57,6 @@ class GuardCore(Core[GuardContext]):
     table = TABLE
     handlers = HANDLERS
     stopping = Trigger.STOPPED
-    giving_away = (State.GIVING_BACK, State.ENDED)
     failed = State.ENDED
     state: State = State.CONNECTING
     is_enabled = False  # asked for, and not yet taken up
