@@ -24,7 +24,6 @@ class Meet(Handler[FlightT], ABC):
         flight.vehicle.attitude_parameters.clear()
         self._started_us = now_us  # to look for a vehicle, then with it
         self._requests: Iterator[VehicleCommand] | None = None
-        self._asked: float | None = None  # the last message
         self._measuring_since_us: int | None = None
         self.is_told = False  # what is waited for
 
@@ -66,15 +65,14 @@ class Meet(Handler[FlightT], ABC):
 
     def _ask(self, flight: FlightT, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
+        pending, asked = flight.command_client.pending, flight.streams.asked.get(MessageId.HIGHRES_IMU)
         outcome, imu = flight.command_outcome(inputs, False, now_us), flight.vehicle.autopilot.lesser_imu
-        has_none = outcome is not None and outcome.refused and self._asked == MessageId.HIGHRES_IMU
-        if has_none and imu is not None:
-            _, interval_us = flight.streams.asked[MessageId.HIGHRES_IMU].parameters
-            requests = self._requests = chain([set_message_interval(imu, round(interval_us))], requests)
+        has_none = outcome is not None and outcome.refused and pending == asked
+        if has_none and asked is not None and imu is not None:
+            requests = self._requests = chain([set_message_interval(imu, round(asked.parameters[1]))], requests)
         if flight.command_client.pending is not None:
             return
         if (request := next(requests, None)) is not None:
-            self._asked = request.parameters[0]
             if len(request.parameters) == 2:  # how often it is to come
                 flight.streams.asked[request.parameters[0]] = request
             flight.command_client.begin(request)

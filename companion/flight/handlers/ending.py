@@ -223,10 +223,9 @@ class HandOver(GiveAway[FlightContext]):
         super().__init__(flight, now_us)
         autopilot = flight.vehicle.autopilot
         self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
-        # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
-        self._disarming = flight.armed_at_us is None and flight.expected_mode == autopilot.setpoints
         flight.command_client.cancel()
-        if self._disarming:
+        # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
+        if flight.armed_at_us is None and flight.expected_mode == autopilot.setpoints:
             flight.command_client.begin(DISARM)
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
@@ -242,11 +241,8 @@ class HandOver(GiveAway[FlightContext]):
         if (holder := who_decided(flight, self._mode)) is not None:
             flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
             return True
-        if self._disarming:
-            if flight.command_outcome(inputs, False, now_us) is None:
-                return False
-            self._disarming = False
-            inputs = Inputs()
+        if flight.command_client.pending == DISARM and flight.command_outcome(inputs, False, now_us) is None:
+            return False
         outcome = self._ask_for(self._mode, flight, inputs, now_us)
         if outcome is None:
             return False

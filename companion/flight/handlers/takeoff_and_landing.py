@@ -37,20 +37,18 @@ class TakeOff(Handler[FlightContext]):
         assert isinstance(item, TakeoffItem), "the mission model sees to it"
         self._item = item
         # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
-        self._now = self._lead
+        self._now = self._switch
         self._is_told = flight.vehicle.autopilot.is_told_to_take_off
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
         flight.yaw_rad = flight.vehicle.heading_rad
-        self._ground_ned_m = mean_position(flight)
+        self._target = Target(mean_position(flight), flight.yaw_rad)
         flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
 
     def target(self, flight: FlightContext, now_us: int) -> Target | None:
-        if self._profile is None:
-            return Target(self._ground_ned_m, flight.yaw_rad)
-        if self._is_told:
-            return None  # a setpoint ends its take-off
+        if self._profile is None or self._is_told:
+            return self._target
         place, velocity, acceleration = self._profile.at(self._climbing_s)
         target = Target(place, flight.yaw_rad, velocity, acceleration)
         return target if flight.has_position else target.at_rest()
@@ -58,15 +56,12 @@ class TakeOff(Handler[FlightContext]):
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)
 
-    def _lead(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
-            self._now = self._switch
+    def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        if flight.command_client.pending is None:
+            if now_us - self._started_us < flight.mission.companion.flight.setpoint_lead_s * 1e6:
+                return None
             flight.expected_mode = flight.vehicle.custom_mode
             flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
-            return self._switch(flight, Inputs(), now_us)
-        return None
-
-    def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
         if outcome is None:
             return None
@@ -88,7 +83,7 @@ class TakeOff(Handler[FlightContext]):
         self._now = self._climb
         self.is_active = True
         if self._is_told:
-            flight.target = None
+            flight.target = self._target = None  # a setpoint ends its take-off
             flight.command_client.begin(take_off(self._item.height_m))
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us  # on the clock of ways
@@ -230,21 +225,20 @@ class RecoverInOffboard(Recover[FlightContext]):
         # It flies setpoints, and nothing else is asked for.
         self._is_taken = flight.own_modes == (offboard, None)
         # Of a second hit the first one's request may be on its way.
-        self._is_asked = flight.command_client.requested_mode == offboard
-        is_led = self._is_asked or flight.expected_mode == offboard
-        self._ask_us = now_us + (0 if is_led else LEAD_US)
-        if not self._is_asked:
+        is_asked = flight.command_client.requested_mode == offboard
+        self._ask_us = now_us + (0 if is_asked or flight.expected_mode == offboard else LEAD_US)
+        if not is_asked:
             flight.count_asked_mode()
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if not self._is_taken and now_us >= self._ask_us:
-            if not self._is_asked:
-                self._is_asked = True
-                flight.ask_for_mode(flight.vehicle.autopilot.setpoints)
+            offboard = flight.vehicle.autopilot.setpoints
+            if flight.command_client.requested_mode != offboard:
+                flight.ask_for_mode(offboard)
             outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
             if outcome is not None and not outcome.succeeded:
                 text = f"no recovery from a hit in the landing: {outcome.text}"
                 return Transition(Trigger.INTERRUPTED, text, is_left=True)
             if outcome is not None:
-                self._is_taken, flight.expected_mode = True, flight.vehicle.autopilot.setpoints
+                self._is_taken, flight.expected_mode = True, offboard
         return super().step(flight, inputs, now_us)
