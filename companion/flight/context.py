@@ -16,8 +16,7 @@ from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.surroundings import ObstacleMap
 from companion.messages import CommandAck, CurrentMode, LocalPosition, Outgoing, PositionSetpoint, Setpoint, Vector3
 from companion.mission.item_trajectory import SpeedLimits
-from companion.mission.items import ExpectItem, Step
-from companion.mission.items import Motion as MotionItem
+from companion.mission.items import ExpectItem, Motion, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
 from companion.motion.settling import Lasting
@@ -87,7 +86,7 @@ class StepTally:
     began_us: int | None = None
     hits: int = 0
     pace_factor: float = 1.0
-    left: MotionItem | None = None  # of the item's motion, when it was interrupted
+    left: Motion | None = None  # of the item's motion, when it was interrupted
 
 
 @dataclass(frozen=True, slots=True)

@@ -139,16 +139,15 @@ class FlyItems(_OnTrajectory):
         while True:
             if isinstance(self._action, items.ReturnItem | items.LandItem):
                 return Transition(_TRIGGERS[flight.step.item.name])
-            is_cut_off = bool(self._out_of_reach)
-            if is_cut_off:
+            if self._out_of_reach:
                 policy = flight.mission.obstacles.on_unreachable
                 if policy != "continue":
                     return Transition(_TRIGGERS[policy], self._out_of_reach)
-            elif not self._is_done(flight, now_us):
+                self._leave(flight, now_us)
+                return None  # to look for a way takes time, in which no setpoint is sent
+            if not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
-            if is_cut_off:
-                return None  # to look for a way takes time, in which no setpoint is sent
 
     def _leave(self, flight: FlightContext, now_us: int) -> None:
         """On to the next step, from the setpoint as it was sent: one that is held back does not go on behind a wall."""
