@@ -93,19 +93,17 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
         flight.motors = MotorWatch(len(flight.collisions))
         return
     rotors = 0 if vehicle.identity is None else ROTORS.get(vehicle.identity.vehicle_type, 0)
-    asked = [sample.outputs[:rotors] for sample in samples if isinstance(sample, MotorOutputs)]
-    if not rotors or not asked:
-        return
     hits = len(flight.hits)
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
     was_hit = hits > 0 if flies and (hits == 0 or _is_free(flight)) else None
-    for outputs in asked:
-        if len(outputs) == rotors:
-            damage = flight.motors.take(outputs, was_hit, now_us)
-            if damage is not None:
-                data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
-                wanted = flight.mission.on_damage
-                flight.report(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
+    for sample in samples:
+        if not rotors or not isinstance(sample, MotorOutputs) or len(sample.outputs) < rotors:
+            continue
+        damage = flight.motors.take(sample.outputs[:rotors], was_hit, now_us)
+        if damage is not None:
+            data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
+            wanted = flight.mission.on_damage
+            flight.report(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
 
 
 def _is_free(flight: FlightContext) -> bool:

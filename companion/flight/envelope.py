@@ -40,8 +40,7 @@ class KnownSurface:
     def _faces(self, patch: Patch, place_ned_m: Vector3) -> bool:
         """Whether the patch lies behind that place, or where it is too near, behind the place that is not."""
         short_m = max(0.0, self.surface.distance_m - self.surface.off_m(place_ned_m))
-        n, e, d = minus(plus(place_ned_m, short_m, self.surface.normal_ned), self.origin_ned_m)
-        return patch.faces((n, e, d), self.reach_m)
+        return patch.faces(minus(plus(place_ned_m, short_m, self.surface.normal_ned), self.origin_ned_m), self.reach_m)
 
 
 def unattended_text(autopilot: Autopilot, speed_m_s: float) -> str:

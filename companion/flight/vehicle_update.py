@@ -156,9 +156,8 @@ def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, 
     off on the ground.
     """
     is_aloft = is_held and flight.has_climbed and not goes_down
-    place, target = None, flight.target
-    if is_held and target is not None and target.lean is None:
-        place = target.position_ned_m
+    target = flight.target if is_held else None
+    place = None if target is None or target.lean is not None else target.position_ned_m
     height_m, least_m = flight.height_m, flight.mission.companion.min_detection_height_m
     if off_state is None and not flight.has_climbed:
         # Lift-off, ground effect and skids shake and push.

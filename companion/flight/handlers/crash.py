@@ -27,20 +27,15 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
         return None
     tilt_deg = math.degrees(tilt_rad(attitude.attitude_wxyz))
     speed_m_s = hits[-1].report().impact_speed_m_s if hits else math.hypot(*latest.velocity_ned_m_s)
-    damage, height_m = flight.motors.damage, -flight.mission_ned_m(latest.position_ned_m)[2]
+    place = latest.position_ned_m
+    damage, height_m = flight.motors.damage, -flight.mission_ned_m(place)[2]
+    motor = None if damage is None else damage.motor
     flight.flew_us = None
     flight.crashed = f"crashed: {how}, tilted by {tilt_deg:.0f} degrees"
     text = f"{flight.crashed}, {height_m:z.1f} m up, {'last hit' if hits else 'moving'} at {speed_m_s:.1f} m/s"
     text += "" if damage is None else f"; {damage.text}"
     flight.report(
-        now_us,
-        "crashed",
-        text,
-        how=how,
-        tilt_deg=tilt_deg,
-        position_ned_m=latest.position_ned_m,
-        speed_m_s=speed_m_s,
-        motor=None if damage is None else damage.motor,
+        now_us, "crashed", text, how=how, tilt_deg=tilt_deg, position_ned_m=place, speed_m_s=speed_m_s, motor=motor
     )
     return Transition(Trigger.CRASHED)
 
