@@ -117,26 +117,27 @@ def _with_place(
 ) -> Target:
     """The place in front of what is known, within the step and the fence."""
     place, vehicle = target.position_ned_m, around.vehicle_ned_m
-    asked = place
     # One that does not move is where a recovery or an item has it on purpose.
     if vehicle is not None and target.velocity_ned_m_s is not None:
         ahead = [one.surface for one in around.known if one.is_ahead(vehicle, place)]
         # As near as the vehicle itself is.
         place = projected(place, [(one.normal_ned, min(one.level_m, along(vehicle, one.normal_ned))) for one in ahead])
-        reasons += ["too near to what is known"] if place is not asked else []
-    if around.last_ned_m is not None:
-        most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
-        wanted, place = place, _within_step(place, around.last_ned_m, most_m)
-        reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if place is not wanted else []
-    if vehicle is not None:
-        wanted, place = place, _within_step(place, vehicle, limits.max_step_m)
-        reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if place is not wanted else []
+        reasons += ["too near to what is known"] if place is not target.position_ned_m else []
+    farthest_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
+    steps = (
+        (around.last_ned_m, farthest_m, f"moves faster than {limits.max_speed_m_s:g} m/s"),
+        (vehicle, limits.max_step_m, f"more than {limits.max_step_m:g} m from the vehicle"),
+    )
+    for start, most_m, reason in steps:
+        if start is not None and (distance_m := math.dist(place, start)) > most_m:
+            place = towards(start, place, most_m / distance_m)
+            reasons.append(reason)
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
         if math.dist(inside, place) > _ROUNDING_M:
             place = inside
             reasons.append("outside the fence")
-    return target if place == asked else Target(place, target.yaw_rad)
+    return target if place == target.position_ned_m else Target(place, target.yaw_rad)
 
 
 def _with_velocity(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:
@@ -215,12 +216,6 @@ def _ahead(around: Surroundings, fence: Fence, start: Vector3, end: Vector3) -> 
         normal = ((inside_n - north_m) / beyond_m, (inside_e - east_m) / beyond_m, 0.0)
         surfaces.append(Surface((origin[0] + inside_n, origin[1] + inside_e, 0.0), normal, 0.0))
     return surfaces
-
-
-def _within_step(place: Vector3, start: Vector3, most_m: float) -> Vector3:
-    """The place, or where the way from the start to it is `most_m` long."""
-    distance_m = math.dist(place, start)
-    return place if distance_m <= most_m else towards(start, place, most_m / distance_m)
 
 
 def _within_fence(place: Vector3, origin: Vector3, fence: Fence, has_floor: bool) -> Vector3:
