@@ -126,11 +126,13 @@ class Preflight:
 
     def _hear(self, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
         now_us, listens = self.now_us, self._listens
+        if isinstance(sample, messages.Heartbeat) and not is_autopilot(sample):
+            return  # before the vehicle is met others are heard, too
         self.vehicle.update(sample, now_us)
         if listens:
             self.streams.count(type(sample), now_us)
         match sample:
-            case messages.Heartbeat() if is_autopilot(sample) and self.heard_since_us is None and self.refusal is None:
+            case messages.Heartbeat() if self.heard_since_us is None and self.refusal is None:
                 identity = identify(sample)
                 if isinstance(identity, str):
                     self.refusal = identity

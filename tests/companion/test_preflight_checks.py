@@ -241,8 +241,8 @@ def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
 
 def test_silence_is_told_after_the_stated_wait():
     survey = Preflight(CompanionConfig(), 0)
-    survey.advance([], 9_900_000)
-    assert not survey.finished
+    survey.advance([replace(PX4, component_id=190, armed=True)], 9_900_000)
+    assert not survey.finished and survey.vehicle.armed is None, "a ground station's heartbeat"
     survey.advance([], 10_100_000)
     assert survey.finished
     assert "no PX4" in (survey.refusal or "")

@@ -254,6 +254,8 @@ def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come(monkeypatch):
         ("tcp:127.0.0.1:5760", "did you mean tcpout://127.0.0.1:5760?"),
         ("192.168.1.20:14580", "did you mean udpout://192.168.1.20:14580?"),
         ("14540", "did you mean udpin://0.0.0.0:14540?"),
+        ("99999", "is not a connection address: use udpin://"),
+        ("/dev/ttyUSB0:fast", "is not a connection address: use udpin://"),
         ("mavlink://x:1", "mavlink"),
         ("udpin://0.0.0.0", "udpin"),
         ("udpin://0.0.0.0:99999", "there is no port 99999, the last is 65535."),

@@ -85,21 +85,21 @@ def parsed(url: str) -> Endpoint:
 def _meant(text: str) -> str | None:
     """What other programs' habits stand for: pymavlink's `udp:HOST:PORT`, a device, a host and port, a port alone."""
     scheme, _, rest = text.partition(":")
+    known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
     if text.startswith("/dev/"):
         # PX4's TELEM2 for a companion.
         device, _, baud = text.replace(",", ":").partition(":")
-        return f"serial://{device}:{baud or 921600}"
-    host_port = _HOST_PORT.match(rest) or _HOST_PORT.match(text)
-    if host_port is not None and int(host_port["port"]) > _MOST_PORT:
+        meant = f"serial://{device}:{baud or 921600}"
+    elif known is not None and _HOST_PORT.match(rest):
+        meant = f"{known}://{rest}"
+    elif text.isdecimal():
+        meant = f"udpin://0.0.0.0:{text}"
+    else:
+        meant = f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
+    try:
+        return parsed(meant).url
+    except AddressError:
         return None
-    known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
-    if known is not None and _HOST_PORT.match(rest):
-        return f"{known}://{rest}"
-    if text.isdecimal():
-        return f"udpin://0.0.0.0:{text}"
-    if not _HOST_PORT.match(text):
-        return None
-    return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
 def one_host(remote: Endpoint) -> tuple[socket.AddressFamily, Any]:
