@@ -200,9 +200,8 @@ BEHIND_M = 2.0 * PLACE_SPREAD_M
 ROUNDS = 5
 
 # --- the present motion
-# Time constant of the acceleration's low-pass filter and of corrections by the vehicle's estimate: a few samples of the
-# slowest stream, against vibration; shorter than the estimate's noise lasts, longer than its delay. A contact counts so
-# long after its last sample: it may go on, or the filtered motion does not contain it yet.
+# Time constant of the acceleration's low-pass filter: a few samples of the slowest stream, against vibration. A contact
+# counts so long after its last sample: it may go on, or the filtered motion does not contain it yet.
 SMOOTHED_S = 0.05
 # Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
@@ -215,8 +214,7 @@ CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
-# The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
-# 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
+# A receiver is needed no more once the reported velocity has agreed with its for so long: a swing only passes through.
 COMPARED_S = 0.5
 # PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
 MOST_BIAS_M_S2 = 0.4

@@ -229,7 +229,7 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
 def test_a_program_that_begins_to_send_setpoints_in_a_recovery_does_not_end_it():
     air = recovering()
     # When it asks for a way along the wall, on a link of its own
-    air.every(0.05, lambda: air.velocity(0.0, 0.5))
+    air.every(0.05, lambda: air.velocity(0.0, 0.25))
     # Then the vehicle rests all the same, and is given back to hold, where nobody's setpoints count
     air.run_to(State.WATCHING, 10.0)
     assert air.told("recovered") != [] and air.told("let_go") == [] and air.mode == "AUTO.LOITER"

@@ -11,7 +11,7 @@ from companion.reflex.config import FADED_US
 from companion.reflex.detection.confirmation import Hypothesis
 from companion.reflex.detection.detector import DetectorState, Phase
 from companion.reflex.detection.impact import ImpactEstimator
-from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.laws import Contact, MotionState
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.surface import Normal, away_from, with_change
 
@@ -92,13 +92,14 @@ class CollisionRecord:
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""
-        normal = self.normal.direction_ned
+        estimator, normal = self.estimator, self.normal.direction_ned
+        shown: MotionState | LocalPosition = estimator.motion if estimator.has_converged else sample
         away = unit(minus(self.setpoint_ned_m, self.contact.position_ned_m))
-        past_m = along(minus(sample.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)
+        past_m = along(minus(shown.position_ned_m, self.setpoint_ned_m), normal if away == ZERO else away)
         self.overshoot_m = max(self.overshoot_m, past_m)
         # A velocity, which may be late, shows the rebound; later the vehicle's own controller makes it.
-        if sample.time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6:
-            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, along(sample.velocity_ned_m_s, normal))
+        if sample.time_boot_us - estimator.pushed_boot_us <= LATEST_S * 1e6:
+            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, along(shown.velocity_ned_m_s, normal))
 
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s

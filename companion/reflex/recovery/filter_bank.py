@@ -20,9 +20,19 @@ class FilterBank:
     Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3, time_boot_us: int) -> None:
-        """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
-        self.time_boot_us, self._summed_m_s = time_boot_us, ZERO
+    def __init__(
+        self,
+        start: MotionState,
+        spread_m_s: float,
+        error_m_s: Vector3,
+        time_boot_us: int,
+        summed_m_s: Vector3 = ZERO,
+    ) -> None:
+        """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e.
+
+        `summed_m_s`: the accelerometer's integral until then.
+        """
+        self.time_boot_us, self._summed_m_s = time_boot_us, summed_m_s
         models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
@@ -31,6 +41,10 @@ class FilterBank:
         self.tilted = np.zeros((2, models, 3))  # errors of what is reported by a tilt that is wrong across e
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
         self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
+
+    def drop_errors(self) -> None:
+        """What is reported is right: the model without an error counts alone."""
+        self.log_likelihoods[:-1] = -math.inf
 
     def predict(self, time_boot_us: int, summed_m_s: Vector3, level_m_s2: Vector3) -> None:
         """Up to a time, with the accelerometer's integral until then; its attitude may be slightly wrong.
@@ -77,11 +91,6 @@ class FilterBank:
         spread2 = (share @ (self.covariance[:, 1, 1, None] + (self.state[..., 1] - [u, v, w]) ** 2)).max()
         left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
         return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
-
-    def mean_error(self, which: int, share: Floats) -> Vector3:
-        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
-        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
-        return (n, e, d)
 
     def _probabilities(self) -> Floats:
         """Probability of each model."""

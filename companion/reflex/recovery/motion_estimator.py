@@ -44,29 +44,26 @@ class MotionEstimator:
     normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
-    has_converged: bool = False  # the vehicle's estimate is right again
+    has_converged: bool = False  # what is wrong of the vehicle's own estimate is known
     external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
-    position_error_m: Vector3 = ZERO  # remaining error of the reported position, once it has converged
+    position_error_m: Vector3 = ZERO  # of the newest reported position
+    velocity_error_m_s: Vector3 = ZERO  # and of the reported velocity
     after_ned_m_s: Vector3 = ZERO  # the velocity just after the contact, by when it was known best
     after_error_m_s: float = math.inf  # its standard deviation; infinite until it is known
+    _expected_within_m_s: float = field(init=False)  # standard deviation of the expected motion's velocity
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _time_boot_us: int = 0  # of the newest sample of the accelerometer
-    _hidden_error_m_s: Vector3 = ZERO  # remaining error of the reported velocity
     _swings_m_s: float = 0.0  # standard deviation of its further swing, by the bank
-    _rate_error_m_s: Vector3 = ZERO  # its difference from the positions' rate
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # with the measured one, by itself
-    # For how long the reported velocity, less its mean error and as it is, has been the measured one.
-    _steady: Lasting = field(default_factory=Lasting)
-    _same: Lasting = field(default_factory=Lasting)
-    _newest: LocalPosition | None = None  # newest report since convergence, corrected
+    _same: Lasting = field(default_factory=Lasting)  # for how long the reported velocity has been the measured one
 
     def __post_init__(self) -> None:
         self.motion, self.pushed_boot_us, self.external_m_s2 = self.start, self.hit_boot_us, self.known_wind_m_s2
@@ -74,13 +71,13 @@ class MotionEstimator:
         self._begin()
 
     def _begin(self, impulse_m_s: float = 0.0) -> None:
-        self._bank, self._measured, self._newest, self._steady, self._same = None, None, None, Lasting(), Lasting()
+        self._bank, self._measured, self._same = None, None, Lasting()
         self.has_converged = self._has_agreed = self._was_odd = False
         came_m_s = math.hypot(*self.contact.velocity_ned_m_s)
         # Beyond an elastic rebound the obstacle moved, nobody knows how fast: as much again may be hidden.
         moved_m_s = impulse_m_s if impulse_m_s > 2.0 * came_m_s else 0.0
-        self.spread_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
-        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = ZERO
+        self.spread_m_s = self._expected_within_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
+        self.position_error_m = self.velocity_error_m_s = ZERO
         self._swings_m_s = 0.0
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal, impulse_m_s: float) -> None:
@@ -182,8 +179,10 @@ class MotionEstimator:
         is_right = self.is_fully_measured or (self.has_converged and was is None)
         if is_right or doppler.taken_boot_us <= newest_us:
             return
-        now_us, velocity, variance = self._time_boot_us, self.motion.velocity_ned_m_s, self.spread_m_s**2
-        known = was or MeasuredVelocity(now_us, self._summed_m_s, velocity, variance)
+        now_us, summed = self._time_boot_us, self._summed_m_s
+        # It begins with what was expected: reports may be wrong in a way that no model has.
+        expected = plus(self.start.velocity_ned_m_s, 1.0, summed)
+        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2)
         known.predict(now_us, self._summed_m_s)
         since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
         was_odd, self._was_odd = self._was_odd, known.update(doppler, self._was_odd)
@@ -204,12 +203,6 @@ class MotionEstimator:
         if self._measured is None or self.is_fully_measured or self._has_agreed:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < numbers.CURRENT_US
-
-    @property
-    def is_known(self) -> bool:
-        """Whether what is wrong of the report is known as it is now."""
-        is_steady = self._steady.since_us is not None
-        return self.has_converged and (is_steady or not self.is_measured_apart)
 
     @property
     def left_m_s(self) -> float:
@@ -242,20 +235,19 @@ class MotionEstimator:
             self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, flown_m_s)
             self.after_error_m_s = error_m_s
 
+    @property
+    def _is_right(self) -> bool:
+        """Whether the vehicle's own estimate contains the whole hit by now."""
+        return self.is_fully_measured or self._has_agreed
+
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
         at_us = sample.time_boot_us - round(1e6 * numbers.DELAY_S)
-        if at_us <= self.hit_boot_us:
-            return
-        if self.is_fully_measured:
-            self.has_converged = True
-        elif not self._has_agreed and (self.has_converged or sample.time_boot_us > self.pushed_boot_us):
+        if at_us > self.hit_boot_us and (self._is_right or sample.time_boot_us > self.pushed_boot_us):
             self._filter(sample, at_us)
-        if self.has_converged:
-            self._correct(sample)
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
-        """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
+        """Update the bank by one report. What is wrong of it is known once the swing that is left is small enough."""
         now_us, bank = self._time_boot_us or at_us, self._bank
         before_us = self.hit_boot_us if bank is None else bank.time_boot_us
         if abs(now_us - at_us) > numbers.LONGEST_GAP_US or now_us <= before_us:
@@ -264,7 +256,11 @@ class MotionEstimator:
         config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - before_us), 1e-6 * (now_us - at_us)
         # Clipping hides between none and all of the change of velocity.
         half = plus(ZERO, 0.5, minus(self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s))
-        bank = self._bank = bank or FilterBank(self.start, self.spread_m_s, half, self.hit_boot_us)
+        if bank is None:
+            bank = self._bank = FilterBank(self.start, self.spread_m_s, half, self.hit_boot_us)
+        if self._is_right:
+            bank.drop_errors()
+            half = ZERO
         # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
         level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
         if not self.fits_models:
@@ -277,87 +273,41 @@ class MotionEstimator:
         velocity = plus(sample.velocity_ned_m_s, behind_s, self._smoothed_m_s2)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * numbers.STAMP_RESOLUTION_US))
+        # What a model lacks of a place lasts, too; a place's own error does not.
+        place_colour = 1.0 if self.has_converged else colour
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
         off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
-        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
+        right_place = minus(place, self.position_error_m) if self._has_agreed else place
+        bank.update(0, way_s + behind_s * g, right_place, place_colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         normal = away_from(self.normal.direction_ned)
         bank.leave(normal, along(self._summed_m_s, normal), self.normal.error_rad)
         motion, spread_m_s, self._swings_m_s = bank.estimate(left)
         # Of the height the report is right sooner than any model: a barometer shows no hit.
-        is_led = self.has_converged or self._measured is not None
+        is_led = self._measured is not None and not self._has_agreed
         n, e, _ = self.motion.position_ned_m if is_led else motion.position_ned_m
         estimate = MotionState((n, e, place[2]), motion.velocity_ned_m_s)
-        is_known, error_m_s = self._swings_m_s <= SAME_M_S, bank.mean_error(1, g)
+        is_apart, is_calm = self.is_measured_apart, self._swings_m_s <= SAME_M_S
         if not self.fits_models:
             # By then a receiver's velocity has come, where there is one.
-            is_known = is_known and sample.time_boot_us - self.pushed_boot_us > numbers.CURRENT_US
-        is_apart = self.is_measured_apart
-        self.has_converged = self.has_converged or (is_known and not is_apart)
-        if is_apart or not self.has_converged:
-            self._believe(estimate, spread_m_s)
-        if is_apart:
-            self._compare(velocity, error_m_s[2], elapsed_s, is_known, sample.time_boot_us)
-        elif self.has_converged:
-            self.position_error_m, self._hidden_error_m_s = flat(bank.mean_error(0, way_s)), error_m_s
+            is_late = sample.time_boot_us - self.pushed_boot_us > numbers.CURRENT_US
+            is_calm = is_calm and is_late and not is_apart
+        self.has_converged = self._is_right or is_calm
+        self._believe(estimate, 0.0 if self.has_converged else spread_m_s)
+        self._compare(place, velocity, is_apart, sample.time_boot_us)
 
-    def _compare(
-        self, reported_m_s: Vector3, climb_error_m_s: float, elapsed_s: float, is_known: bool, time_boot_us: int
-    ) -> None:
-        """Take the reported velocity's error by the measured one.
-
-        It is known once it hardly changes, and by all models nothing swings (`is_known`): a swing only passes through
-        what was measured. Once the two have agreed for a while the receiver is needed no more.
+    def _compare(self, place_ned_m: Vector3, velocity_ned_m_s: Vector3, is_apart: bool, time_boot_us: int) -> None:
+        """Take a report, as of now, beside the belief. Once a receiver and the report have agreed for a while, the
+        receiver is needed no more, and the belief goes on by the report alone.
         """
-        off = flat(minus(reported_m_s, self.motion.velocity_ned_m_s))
-        error = flat(towards(self._hidden_error_m_s, off, elapsed_s / (reflex.COMPARED_S + elapsed_s)))
-        self._steady.update(is_known and math.dist(off, error) <= SAME_M_S, time_boot_us)
+        self.velocity_error_m_s = off_m_s = minus(velocity_ned_m_s, self.motion.velocity_ned_m_s)
+        if not self._has_agreed:
+            off_m = flat(minus(place_ned_m, self.motion.position_ned_m))
+            self.position_error_m = ZERO if self.is_fully_measured else off_m
         # `spread_m_s` is the measured one's.
-        self._same.update(math.hypot(*off) <= math.hypot(SAME_M_S, self.spread_m_s), time_boot_us)
-        is_steady = self.fits_models and self._steady.lasts_us > numbers.SHOWN_US
-        self._has_agreed = self._same.lasts_us > 1e6 * reflex.COMPARED_S
-        self.has_converged = self.has_converged or is_steady or self._has_agreed
-        self._hidden_error_m_s = ZERO if self._has_agreed else (error[0], error[1], climb_error_m_s)
-
-    def _correct(self, sample: LocalPosition) -> None:
-        """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter.
-
-        A velocity that is measured apart stays, and so does the place that it leads to: the report's is compared.
-        """
-        if self.is_measured_apart:
-            self.position_error_m = flat(minus(sample.position_ned_m, self.motion.position_ned_m))
-        measured = self.corrected(sample)
-        was, share, before, self._newest = self.motion, 1.0, self._newest, measured
-        if before is not None:
-            elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
-            share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
-            if 0.0 < elapsed_s < reflex.COMPARED_S and not self.is_measured_apart:
-                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
-        place, velocity = towards(was.position_ned_m, measured.position_ned_m, share), was.velocity_ned_m_s
-        if not self.is_measured_apart:
-            velocity, self.spread_m_s = towards(velocity, measured.velocity_ned_m_s, share), 0.0
-        self.motion = MotionState(place, velocity)
-        self._look_back()
-
-    @property
-    def velocity_error_m_s(self) -> Vector3:
-        """Remaining error of the reported velocity, m/s, NED."""
-        return plus(self._hidden_error_m_s, 1.0, self._rate_error_m_s)
-
-    def corrected(self, sample: LocalPosition) -> LocalPosition:
-        """The report without its known errors."""
-        place = minus(sample.position_ned_m, self.position_error_m)
-        velocity = minus(sample.velocity_ned_m_s, self.velocity_error_m_s)
-        return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
-
-
-def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
-    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
-
-    The errors of positions are shorter than those of velocities. The reports are without the error so far.
-    """
-    half_s = 0.5 * elapsed_s
-    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
-    further_m = minus(led, measured.position_ned_m)
-    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
+        is_same = is_apart and math.hypot(*flat(off_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
+        self._same.update(is_same, time_boot_us)
+        if self._same.lasts_us > 1e6 * reflex.COMPARED_S:
+            self._has_agreed = True
+            self._bank = FilterBank(self.motion, self.spread_m_s, ZERO, self._time_boot_us, self._summed_m_s)

@@ -90,15 +90,11 @@ class Recovery:
 
     def _settled_after_s(self, sample: LocalPosition) -> float | None:
         """Time from the hit to the beginning of the present rest, s; None as long as that has not lasted."""
-        record, now_us = self.record, sample.time_boot_us
-        right: MotionState | LocalPosition = record.estimator.motion
+        record, motion, now_us = self.record, self.record.estimator.motion, sample.time_boot_us
         if self._is_known:
-            corrected = record.estimator.corrected(sample)
-            record.follow_recovery(corrected)
-            right = right if self.leans else corrected
-        distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
-        spread_m_s = record.estimator.spread_m_s
-        since_us = self._monitor.settled_since(now_us, distance_m, right.velocity_ned_m_s, spread_m_s)
+            record.follow_recovery(sample)
+        distance_m, spread_m_s = math.dist(motion.position_ned_m, record.setpoint_ned_m), record.estimator.spread_m_s
+        since_us = self._monitor.settled_since(now_us, distance_m, motion.velocity_ned_m_s, spread_m_s)
         is_held = not self.leans and now_us - self._held_since_us >= 1e6 * self._settled.duration_s
         if since_us is None or not is_held or not self._is_known:
             return None
@@ -127,7 +123,7 @@ class Recovery:
         is_there = math.dist(motion.position_ned_m, self.record.setpoint_ned_m) <= reflex.PLACE_SPREAD_M
         # An error that PX4 corrects of a sudden makes it as fast: no more than it brakes within the clearance.
         most_m_s = brakable_m_s(self._config.clearance_m, reflex.LEAD_S)
-        is_right = estimator.is_known and math.hypot(*estimator.velocity_error_m_s) <= most_m_s
+        is_right = estimator.has_converged and math.hypot(*estimator.velocity_error_m_s) <= most_m_s
         is_slow = math.hypot(*motion.velocity_ned_m_s) <= reflex.RESTS_M_S
         self._slow.update(is_right and is_there and is_slow, sample.time_boot_us)
         return self._slow.lasts_us >= 1e6 * self.rests_s

@@ -270,9 +270,9 @@ def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_tri
     assert flight.reflex.left_wrong(HIT_US + 1_000_000).pushed_m_s2 == (0.0, wind_m_s2, 0.0)
 
 
-def measured_apart() -> MotionEstimator:
-    """Of a hit whose error a receiver shows, 13 s later."""
-    contact, now_us = Contact(AT, (2.0, 0.0, 0.0), SOUTH, 0.2), HIT_US + 13_000_000
+def measured_apart(later_us: int = 13_000_000) -> MotionEstimator:
+    """Of a hit whose error a receiver shows, so much later."""
+    contact, now_us = Contact(AT, (2.0, 0.0, 0.0), SOUTH, 0.2), HIT_US + later_us
     estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
     estimator.imu(Strapdown(time_boot_us=now_us))
     for taken_us in range(now_us, now_us + 100):
@@ -286,21 +286,21 @@ def test_it_is_not_handed_over_to_a_velocity_that_is_far_off():
     recover, estimator = recover_in(flight), flight.collisions[0].estimator
     # Given a vehicle at rest that takes itself for 2 m/s fast, and then for 0.5
     for from_us, wrong_m_s, kind in ((100_000, 2.0, AttitudeSetpoint), (600_000, 0.5, PositionSetpoint)):
-        estimator._hidden_error_m_s = (wrong_m_s, 0.0, 0.0)
+        estimator.velocity_error_m_s = (wrong_m_s, 0.0, 0.0)
         for since_us in range(from_us, from_us + 500_000, 20_000):
             _, sent = hears(flight, recover, since_us, 2.4, wrong_m_s)
         assert isinstance(sent, kind)
 
 
-def test_it_is_not_handed_over_while_what_is_wrong_of_its_velocity_changes():
-    # Given a vehicle at rest that soon takes itself for 1 m/s fast
-    estimator = measured_apart()
+def test_it_is_not_handed_over_while_what_is_wrong_of_its_velocity_may_swing():
+    # Given a vehicle at rest just after a hit that soon takes itself for 1 m/s fast
+    estimator = measured_apart(200_000)
     estimator.motion = MotionState((2.4, *AT[1:]), ZERO)
     flight = flight_with(estimator=estimator)
     recover = recover_in(flight)
-    for since_us in range(13_020_000, 13_300_000, 20_000):
+    for since_us in range(220_000, 500_000, 20_000):
         estimator.imu(Strapdown(time_boot_us=HIT_US + since_us))
-        _, sent = hears(flight, recover, since_us, 2.4, 1.0 if since_us > 13_080_000 else 0.0)
+        _, sent = hears(flight, recover, since_us, 2.4, 1.0 if since_us > 280_000 else 0.0)
     assert isinstance(sent, AttitudeSetpoint)
 
 
@@ -349,7 +349,7 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
     # Given an estimate whose known errors no vehicle has
     flight = flight_with()
     estimator = flight.collisions[0].estimator
-    estimator.has_converged, estimator._hidden_error_m_s = True, (0.0, wrong_m_s, 0.0)
+    estimator.has_converged, estimator.velocity_error_m_s = True, (0.0, wrong_m_s, 0.0)
     estimator.position_error_m = estimator.level_m_s2 = (wrong_m_s, wrong_m_s, 0.0)
     asked, hit_us = Target((1.0, 2.0, -3.0), 0.5), flight.collisions[0].estimator.hit_boot_us
 
