@@ -354,6 +354,10 @@ class MissionItem(StrictModel):
         return action
 
 
+# Now that there is what it is made of.
+RepeatItem.model_rebuild()
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """`label` is the item's number as people count, "4.2 (2 of 3)" for the second lap of a repeat.

@@ -119,7 +119,7 @@ def wait_until_there(text, is_there=True):
 def assert_comes_again(folder):
     """What the companion decided in this flight, it decides again from the folder alone, to the bit."""
     _, difference = reproduce(read_recording(folder))
-    assert difference is None
+    assert difference is None, difference
 
 
 def assert_one_clear_sentence(result, *words):
