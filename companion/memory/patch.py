@@ -29,7 +29,9 @@ GOES_ON_MOST_M = 2.0
 def _outwards(normal_ned: Vector3) -> Vector3:
     if not any(normal_ned):
         raise ValueError("has no direction; it points out of the surface, such as [-1, 0, 0]")
-    return away_from(normal_ned)
+    outwards = away_from(normal_ned)
+    # One that has been read before stays as it is, to the bit: a flight with it can be repeated.
+    return normal_ned if math.dist(outwards, normal_ned) < 1e-12 else outwards
 
 
 class Patch(StrictModel):
