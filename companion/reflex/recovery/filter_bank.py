@@ -92,6 +92,11 @@ class FilterBank:
         left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
         return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
 
+    def mean_error(self, which: int, share: Floats) -> Vector3:
+        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
+        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
+        return (n, e, d)
+
     def _probabilities(self) -> Floats:
         """Probability of each model."""
         share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max())) * self.leaves

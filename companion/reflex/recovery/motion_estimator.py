@@ -295,18 +295,20 @@ class MotionEstimator:
             is_calm = is_calm and is_late and not is_apart
         self.has_converged = self._is_right or is_calm
         self._believe(estimate, 0.0 if self.has_converged else spread_m_s)
-        self._compare(place, velocity, is_apart, sample.time_boot_us)
+        if is_apart:
+            self._compare(place, velocity, sample.time_boot_us)
+        else:
+            self.velocity_error_m_s = bank.mean_error(1, g)
+            self.position_error_m = self.position_error_m if self._has_agreed else flat(bank.mean_error(0, way_s))
 
-    def _compare(self, place_ned_m: Vector3, velocity_ned_m_s: Vector3, is_apart: bool, time_boot_us: int) -> None:
-        """Take a report, as of now, beside the belief. Once a receiver and the report have agreed for a while, the
-        receiver is needed no more, and the belief goes on by the report alone.
+    def _compare(self, place_ned_m: Vector3, velocity_ned_m_s: Vector3, time_boot_us: int) -> None:
+        """Take a report, as of now, beside what a receiver shows. Once the two have agreed for a while the receiver is
+        needed no more, and the belief goes on by the report alone.
         """
+        self.position_error_m = flat(minus(place_ned_m, self.motion.position_ned_m))
         self.velocity_error_m_s = off_m_s = minus(velocity_ned_m_s, self.motion.velocity_ned_m_s)
-        if not self._has_agreed:
-            off_m = flat(minus(place_ned_m, self.motion.position_ned_m))
-            self.position_error_m = ZERO if self.is_fully_measured else off_m
         # `spread_m_s` is the measured one's.
-        is_same = is_apart and math.hypot(*flat(off_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
+        is_same = math.hypot(*flat(off_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
         self._same.update(is_same, time_boot_us)
         if self._same.lasts_us > 1e6 * reflex.COMPARED_S:
             self._has_agreed = True
