@@ -143,6 +143,10 @@ def test_a_patch_comes_back_from_a_file_as_it_was():
         assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
         # and a second time to the last digit
         assert as_data(Patch.model_validate(as_data(patch))) == as_data(patch)
+    # nor is a steep one turned
+    for degrees in range(90):
+        once = wall(0.0, normal=(math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 1.5))
+        assert wall(0.0, normal=once.normal_ned).normal_ned == once.normal_ned
 
 
 REACH_M, MARGIN_M = 0.2, 0.35

@@ -12,7 +12,7 @@ from companion.motion.config import CURRENT_US, SAME_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import TILT_PER_S, EstimateConfig
-from companion.reflex.recovery.laws import Contact
+from companion.reflex.recovery.laws import Contact, MotionState
 from companion.reflex.recovery.motion_estimator import MotionEstimator
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
@@ -28,10 +28,6 @@ def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, known_wind_m_
     return MotionEstimator(
         contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits, known_wind_m_s2
     )
-
-
-def said(north_m_s, since_us, position):
-    return LocalPosition(HIT_US + since_us, position, (north_m_s, 0.0, 0.0))
 
 
 def missing(since_s, late_s, rad_s, damping):
@@ -117,10 +113,10 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
     assert sum(within) >= 0.95 * len(within)
 
 
-@pytest.mark.parametrize("later_s", [0.06, 1.0])
-def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s):
+@pytest.mark.parametrize(("later_s", "fits"), [(0.06, True), (0.06, False), (1.0, True)])
+def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s, fits):
     # Given a contact of 20 ms whose own force is less than 1 g
-    found, strapdown = reckoned((1.5, -2.5, 0.0)), Strapdown()
+    found, strapdown = reckoned((1.5, -2.5, 0.0), fits=fits), Strapdown()
 
     def go_on(seconds, acceleration):
         for _ in range(round(seconds / 0.004)):
@@ -137,7 +133,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     found.update(LocalPosition(strapdown.time_boot_us, AT, velocity))
     # Then it is known how the vehicle left, the worse the later
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.05)
-    assert found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
+    assert found.has_converged and found.after_error_m_s == pytest.approx(0.5 * later_s, abs=0.01)
     # and a later one, which is known worse, does not count
     go_on(0.1, (1.0, 3.0, 0.0))
     found.update(LocalPosition(strapdown.time_boot_us, AT, (5.0, 5.0, 0.0)))
@@ -163,6 +159,24 @@ def test_an_estimate_that_knows_the_hit_is_believed_soon_and_later_one_that_is_l
     right_s, lost_s, later_s = (next(since_s for since_s, *_, found in run if found.has_converged) for run in runs)
     # Then one that flies into the wall is not, and one without a model once its receiver could have spoken
     assert right_s < 0.5 and lost_s > 0.9 and right_s < 1e-6 * CURRENT_US < later_s
+
+
+def test_a_report_from_within_the_contact_says_nothing_of_the_motion_after_it():
+    found, strapdown = reckoned(), Strapdown(time_boot_us=HIT_US + 80_000)
+    found.note_contact(False, HIT_US + 80_000, found.normal, 0.0)
+    found.imu(strapdown)
+    expected = found.motion
+    found.update(LocalPosition(HIT_US + 76_000, AT, (5.0, 0.0, 0.0)))
+    assert found.motion == expected
+
+
+def test_overshoot_and_rebound_are_the_beliefs_once_what_is_wrong_of_the_report_is_known():
+    record = flight_with(estimator=reckoned()).collisions[0]
+    estimator, record.setpoint_ned_m = record.estimator, (2.4, *AT[1:])
+    estimator.motion = MotionState(record.setpoint_ned_m, (-0.5, 0.0, 0.0))
+    for estimator.has_converged, shown in ((True, (0.0, 0.5)), (False, (1.0, 2.0))):
+        record.follow_recovery(LocalPosition(HIT_US + 50_000, (1.4, *AT[1:]), (-2.0, 0.0, 0.0)))
+        assert (record.overshoot_m, record.rebound_speed_m_s) == pytest.approx(shown)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -279,30 +293,11 @@ def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(a
     for number, (since_s, lacks_m_s, lacks_m) in enumerate(reports(found, strapdown, 2.4), start=1):
         place = (3.0 - 0.4 * since_s + 2.4 * hides * lacks_m, 0.0, -2.0)
         at_us = round(1e6 * since_s) + (ahead_us if number % 5 == 0 and number < 50 else 0)
-        found.update(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
+        found.update(LocalPosition(HIT_US + at_us, place, (-0.4 + 2.4 * hides * lacks_m_s, 0.0, 0.0)))
         # Then the motion stays one that a vehicle can have
         assert math.isfinite(found.spread_m_s)
         assert -2.5 < found.motion.velocity_ned_m_s[0] < 2.5
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
-
-
-def recovering():
-    flight = flight_with(estimator=reckoned())
-    return flight, flight.collisions[0], recover_in(flight)
-
-
-def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
-    # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
-    flight, record, recover = recovering()
-    record.estimator.note_contact(True, HIT_US, record.estimator.normal, 0.0)
-    for at_us in range(100_000, 5_000_000, 20_000):
-        recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
-        if record.is_over:
-            break
-    # Then the recovery is over although 0.15 m/s is told
-    assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
-    assert abs(record.estimator.motion.velocity_ned_m_s[0]) < 0.1
-    assert record.is_over and record.settled_after_s < 3.5
 
 
 @pytest.mark.parametrize(
@@ -310,7 +305,7 @@ def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
 )
 def test_a_vehicle_that_a_hit_has_turned_is_turned_back_at_leisure(heading_deg, asked_deg):
     # Given a vehicle that is to head north
-    flight, _, recover = recovering()
+    recover = recover_in(flight := flight_with(estimator=reckoned()))
     flight.yaw_rad, half_rad = 0.0, math.radians(0.5 * heading_deg)
     attitude_wxyz = (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad))
     flight.vehicle.attitude = Attitude(HIT_US, attitude_wxyz)
