@@ -201,7 +201,7 @@ ROUNDS = 5
 
 # --- the present motion
 # Time constant of the acceleration's low-pass filter: a few samples of the slowest stream, against vibration. A contact
-# counts so long after its last sample: it may go on, or the filtered motion does not contain it yet.
+# counts until as long after its last sample: it may go on, or the filtered motion does not contain it yet.
 SMOOTHED_S = 0.05
 # Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5

@@ -176,8 +176,8 @@ class MotionEstimator:
         """Take a receiver's velocity and place: the horizontal ones from then on, until the vehicle's own agrees."""
         was = self._measured
         newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
-        is_right = self.is_fully_measured or (self.has_converged and was is None)
-        if is_right or doppler.taken_boot_us <= newest_us:
+        needs_none = self.is_fully_measured or (self.has_converged and was is None)
+        if needs_none or doppler.taken_boot_us <= newest_us:
             return
         now_us, summed = self._time_boot_us, self._summed_m_s
         # It begins with what was expected: reports may be wrong in a way that no model has.
