@@ -13,7 +13,7 @@ from companion.companion import Companion, Stepped, StepResult
 from companion.errors import ReboundError
 from companion.messages import ComputerStatus
 from companion.shell.clock import Clock
-from companion.shell.computer import ComputerReader
+from companion.shell.computer import computer_status
 from companion.shell.connections.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
@@ -99,7 +99,7 @@ class Computer:
     """Once a second its status of a second ago, read on a thread of its own: a disk that hangs answers nobody."""
 
     def __init__(self, folder: Path) -> None:
-        self._reader = ComputerReader(folder)
+        self._folder = folder
         self._background = Background("the computer's status")
         self._latest: ComputerStatus | None = None
         self._due_us = 0
@@ -114,7 +114,7 @@ class Computer:
         return latest
 
     def _read(self, now_us: int) -> None:
-        self._latest = self._reader.read(now_us)
+        self._latest = computer_status(self._folder, now_us)
 
     def close(self) -> None:
         # A disk that hangs is not waited for.

@@ -1,4 +1,4 @@
-"""The computer: what is said of it, from files as Linux writes them, and what its systemd is told, in virtual time."""
+"""The computer: what is said of it, and what its systemd is told, in virtual time."""
 
 import contextlib
 import errno
@@ -15,60 +15,33 @@ from bench.fly.packets import decoded
 from companion.mavlink.encode import Encoder
 from companion.messages import ComputerStatus
 from companion.shell import computer
-from companion.shell.computer import ComputerReader
 from companion.shell.service_manager import STATUS_EVERY_US, ServiceManager, service_manager
 
-Usage = namedtuple("Usage", "total used free")
-GIB = 1 << 30
+Usage, Memory = namedtuple("Usage", "total used free"), namedtuple("Memory", "total available free")
+Zone = namedtuple("Zone", "current")
+MIB, GIB = 1 << 20, 1 << 30
 
 
-@pytest.fixture
-def linux(tmp_path, monkeypatch):
-    """A computer of two cores whose counters a test sets."""
-    zone = tmp_path / "sys/class/thermal/thermal_zone"
-    for number, millidegrees in enumerate((48_312, 61_200)):
-        folder = tmp_path / f"{zone}{number}"
-        folder.mkdir(parents=True)
-        (folder / "temp").write_text(f"{millidegrees}\n")
-    (tmp_path / "proc").mkdir()
-    (tmp_path / "proc/uptime").write_text("90.50 170.10\n")
-    (tmp_path / "proc/meminfo").write_text(
-        "MemTotal: 3883008 kB\nMemFree: 10 kB\nMemAvailable: 3051520 kB\nHugePages: 0\n"
-    )
-    monkeypatch.setattr(computer.shutil, "disk_usage", lambda _: Usage(30 * GIB, 0, 20 * GIB))
-    return tmp_path
+@pytest.mark.parametrize(("celsius", "told"), [((48.3, 61.2), 61), ((), None)])
+def test_the_computers_status_is_in_the_messages_units_with_its_hottest_zone_if_there_is_one(
+    celsius, told, tmp_path, monkeypatch
+):
+    # Given 10 of 30 GiB and 812 of 3792 MiB in use, and what caches hold is not used
+    zones = {f"zone{number}": [Zone(each)] for number, each in enumerate(celsius)}
+    monkeypatch.setattr(computer.psutil, "sensors_temperatures", lambda: zones)
+    monkeypatch.setattr(computer.psutil, "cpu_percent", lambda percpu: [0.4, 99.6])
+    monkeypatch.setattr(computer.psutil, "virtual_memory", lambda: Memory(3792 * MIB, 2980 * MIB, 10 * MIB))
+    monkeypatch.setattr(computer.psutil, "disk_usage", lambda folder: Usage(30 * GIB, 0, 20 * GIB))
+    monkeypatch.setattr(computer.time, "clock_gettime", lambda clock: 90.5)
+    # Then
+    status = computer.computer_status(tmp_path, 1_000)
+    assert status == ComputerStatus(1_000, 90_500, (0, 100), told, 812, 3792, 10 * 1024, 30 * 1024)
 
 
-def stat(linux, *cores):
-    """user, nice, system, idle, iowait, irq, softirq, steal, guest, guest_nice: hundredths of a second."""
-    lines = ["cpu  1 2 3 4 5 6 7 8 9 10", *(f"cpu{number} {' '.join(map(str, c))}" for number, c in enumerate(cores))]
-    (linux / "proc/stat").write_text("\n".join([*lines, "intr 1 2 3", "ctxt 5"]) + "\n")
-
-
-def test_memory_disk_time_and_temperature_if_there_is_a_sensor_are_the_systems(linux):
-    stat(linux, (0, 0, 0, 100, 0, 0, 0, 0, 0, 0))
-    status = ComputerReader(linux, linux).read(1_000)
-    assert (status.at_us, status.uptime_ms, status.temperature_deg_c) == (1_000, 90_500, 61)
-    # 3883008 and 3051520 kB are 3792 and 2980 MiB; what caches hold is not used
-    assert (status.memory_used_mib, status.memory_total_mib) == (812, 3792)
-    assert (status.disk_used_mib, status.disk_total_mib) == (10 * 1024, 30 * 1024)
-    first, second = sorted((linux / "sys/class/thermal").glob("*/temp"))
-    second.write_text("unknown")
-    assert ComputerReader(linux, linux).read(0).temperature_deg_c == 48
-    first.unlink()
-    assert ComputerReader(linux, linux).read(0).temperature_deg_c is None
-
-
-def test_the_load_of_each_core_is_that_since_the_last_reading(linux):
-    # Given counters since the start, and a second in which one core did nothing and one waited and worked
-    stat(linux, (500, 0, 0, 500, 0, 0, 0, 0, 400, 0), (10, 0, 0, 90, 0, 0, 0, 0, 0, 0))
-    reader = ComputerReader(linux, linux)
-    first = reader.read(0)
-    stat(linux, (500, 0, 0, 590, 10, 0, 0, 0, 400, 0), (20, 5, 10, 130, 10, 3, 2, 20, 0, 0))
-    second = reader.read(1_000_000)
-    # Then waiting for the disk is no work, and a guest's time counts once
-    assert first.cpu_percent == (50, 10)
-    assert second.cpu_percent == (0, 50)
+def test_this_computer_has_a_status(tmp_path):
+    status = computer.computer_status(tmp_path, 0)
+    assert len(status.cpu_percent) == os.cpu_count() and status.uptime_ms > 0
+    assert 0 < status.memory_used_mib < status.memory_total_mib and 0 < status.disk_used_mib <= status.disk_total_mib
 
 
 @pytest.mark.parametrize(
