@@ -142,7 +142,7 @@ class Core(ABC, Generic[FlightT]):
 
         One that is still wrong from a hit only puts that right.
         """
-        before, is_valid = self.resets.shift_ned_m, self.reflex.monitor.estimator.validity.is_valid
+        before, is_valid = self.resets.shift_ned_m, self.reflex.monitor.estimator.is_valid
         most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
         samples = [self.resets.follow(sample, most_m) for sample in samples]
         if self.resets.shift_ned_m != before:

@@ -23,10 +23,9 @@ from companion.reflex.detection.monitor import CollisionMonitor, CollisionMonito
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
 from companion.reflex.recovery.attitude_law import Lean, wanted
 from companion.reflex.recovery.collision import CollisionRecord
-from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact, Law
-from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.recovery.laws import RECOVERY_LAWS, Law
 from companion.reflex.recovery.recovery import Recovery, Room
-from companion.reflex.surface import Surface, away_from
+from companion.reflex.surface import Surface
 
 
 class Reaction(NamedTuple):
@@ -66,13 +65,18 @@ class Reflex:
     crash: CrashWatch = field(default_factory=CrashWatch)
 
     def __post_init__(self) -> None:
-        self.monitor = start_monitor(self.config, 0)
+        self._start(0)
+
+    def _start(self, now_us: int) -> None:
+        self.monitor = start_monitor(self.config, now_us)
+        self.monitor.estimator.recovery = self.law_config
 
     # --- what was touched
 
     def restart(self, now_us: int) -> None:
         """Of a vehicle that has restarted, perhaps by a hit, nothing that was measured before is valid."""
-        hides_clipping, self.monitor = self.monitor.estimator.hides_clipping, start_monitor(self.config, now_us)
+        hides_clipping = self.monitor.estimator.hides_clipping
+        self._start(now_us)
         self.monitor.estimator.hides_clipping = hides_clipping
         self.loss_s = None
         if self.newest is not None:
@@ -135,28 +139,18 @@ class Reflex:
 
     def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> CollisionRecord:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
-        impact, normal, earlier = estimate.impact, estimate.normal, self.in_one_recovery()
-        place, velocity, error_m_s = estimate.position_ned_m, estimate.velocity_ned_m_s, estimate.velocity_error_m_s
-        before, law, source = next(iter(earlier), None), self.law, self.monitor.estimator
-        is_second = law.follows and before is not None and not before.estimator.is_reported
-        if before is not None and is_second:
-            # The vehicle's estimate is still wrong from the hit before.
-            place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
-            error_m_s = before.estimator.spread_m_s
-        contact = Contact(place, velocity, away_from(normal.direction_ned), normal.error_rad, error_m_s)
-        expected, first_us = contact.rebound(self.law_config.restitution), impact.sample_time_boot_us
-        fits_models, wind_m_s2 = not source.hides_clipping, self.sustained_force.hover_wind_m_s2
-        estimator = MotionEstimator(
-            contact, first_us, expected, self.config.estimate, is_second, fits_models, wind_m_s2
-        )
-        estimator.note_contact(estimate.is_fully_measured, first_us, estimate.normal, estimate.impulse_m_s)
-        record = CollisionRecord(now_us, self.config.detector, contact, impact.size_m_s2, estimator, source)
-        if before is None and self._is_attitude_heard:
+        impact, earlier, source = estimate.impact, self.in_one_recovery(), self.monitor.estimator
+        estimator = source.after
+        if estimator is None or estimator.hit_boot_us != impact.sample_time_boot_us:
+            estimator = source.follow_motion(estimate)  # what holds the vehicle no detector has seen
+        estimator.note_wind(self.sustained_force.hover_wind_m_s2)
+        record = CollisionRecord(now_us, self.config.detector, impact.size_m_s2, estimator, source)
+        if not earlier and self._is_attitude_heard:
             force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
             record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
         clearance_m = self.law_config.clearance_m
         surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
-        self.recovery = Recovery(record, law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
+        self.recovery = Recovery(record, self.law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
         self.hits.append(record)
         self.newest = record
         return record
@@ -165,7 +159,7 @@ class Reflex:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
         self.newest = next((each for each in self.hits[-1:] if each.source is self.monitor.estimator), None)
-        self.monitor.estimator.validity.assess(True)
+        self.monitor.estimator.after = None
 
     def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.
@@ -180,15 +174,9 @@ class Reflex:
         return acceleration, Lean(belief, recovery.surfaces, self.monitor.state.thrust.full_m_s2, held_s)
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
-        """Take the samples of the step for the motion after the newest hit, and for what shows a crash."""
-        if (newest := self.newest) is not None:
-            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
-            newest.follow(self.monitor.state, positions)
-            validity, estimator = self.monitor.estimator.validity, newest.estimator
-            if not validity.is_valid:
-                is_newest = validity.hit_boot_us == estimator.hit_boot_us
-                validity.left_m_s = estimator.left_m_s if is_newest else math.inf
-                validity.is_disproved = estimator.is_measured_apart
+        """Take the samples of the step for what confirms the newest hit, and for what shows a crash."""
+        if self.newest is not None:
+            self.newest.follow(self.monitor.state)
         self.crash.update(samples, height_m, landed)
 
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from companion.messages import MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
-from companion.reflex.correction import VelocityValidity
 from companion.reflex.detection.free_flight import ThrustGain
+from companion.reflex.recovery.motion_estimator import MotionEstimator
 
 
 class Phase(Enum):
@@ -64,14 +64,22 @@ class Situation(NamedTuple):
 
 @dataclass(slots=True)
 class Motion:
-    """What the samples add up to. All have heard the newest already. A velocity that is not valid lacks a part of a hit
-    that was clipped; samples behind a filter hide clipping.
-    """
+    """What the samples add up to. All have heard the newest already. Samples behind a filter hide clipping."""
 
     history: MotionHistory = field(init=False, default_factory=MotionHistory)
     strapdown: Strapdown = field(init=False, default_factory=Strapdown)
-    validity: VelocityValidity = field(init=False, default_factory=VelocityValidity)
+    after: MotionEstimator | None = field(init=False, default=None)  # the newest collision
     hides_clipping: bool = field(init=False, default=False)
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the vehicle's own velocity is: it lacks no part of a hit that was clipped."""
+        return self.after is None or self.after.is_valid
+
+    @property
+    def left_m_s(self) -> float:
+        """By how much it may be wrong; infinite where that is not known."""
+        return 0.0 if self.after is None or self.after.is_valid else self.after.left_m_s
 
 
 @dataclass(frozen=True, slots=True)

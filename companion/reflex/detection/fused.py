@@ -205,7 +205,7 @@ class FusedDetector:
     def _turned(self, s: FusedState, free_until_us: int, situation: Situation, motion: Motion) -> Impact | None:
         """What turned a vehicle that did not hover pushed it back: where to, only its velocity before says."""
         now_us = s.last_sample_boot_us
-        before = motion.history.before(free_until_us + 1) if motion.validity.is_known else None
+        before = motion.history.before(free_until_us + 1) if math.isfinite(motion.left_m_s) else None
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
         if s.phase is not Phase.ARMED or is_again or before is None or s.may_be_hand(now_us):
             s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
@@ -298,9 +298,9 @@ class FusedDetector:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
-        caution = 1.0 if type(sample) is Odometry and motion.validity.is_known else 2.0
+        caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
-        corrected_m_s = motion.validity.correction_m_s(jump.compared_us)
+        corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit
         # What is not of one moment adds to a jump, and not to each other.
@@ -310,7 +310,7 @@ class FusedDetector:
         is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.shown) > 1.0)
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
-            if is_jump or motion.validity.is_valid:
+            if is_jump or motion.is_valid:
                 jump.learn(limited(step, least))
             return None
         jump.since_us = time_us

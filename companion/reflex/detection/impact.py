@@ -8,9 +8,11 @@ from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus, unit
-from companion.reflex.config import APPROACH_RAD, CLIPPED_SHARE, SHORT, EstimateConfig
+from companion.reflex.config import APPROACH_RAD, CLIPPED_SHARE, SHORT, EstimateConfig, RecoveryConfig
 from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Motion, Phase
-from companion.reflex.surface import Normal, normal_of
+from companion.reflex.recovery.laws import Contact, MotionState
+from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.surface import Normal, away_from, normal_of
 
 
 @dataclass(slots=True)
@@ -20,8 +22,7 @@ class ContactForce:
     free_frd_m_s2: Vector3  # the accelerometer's value without the contact
     averaging_us: int
     range_m_s2: float
-    came_ned_m_s: Vector3 = ZERO
-    """v_c; zero where it is not known, as in a hit that follows another that clipping hid a part of."""
+    came_ned_m_s: Vector3 = ZERO  # v_c
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)  # in samples above the threshold
     is_clipped: bool = False
@@ -86,6 +87,7 @@ class ImpactEstimator(Motion):
     """Takes all samples, and refines the estimate of the latest impact with each. Times: vehicle's boot clock."""
 
     config: EstimateConfig
+    recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
     doppler: Doppler = field(default_factory=Doppler)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
@@ -94,21 +96,26 @@ class ImpactEstimator(Motion):
 
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
+        after = self.after
         if isinstance(sample, ImuSample):
             f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
             self.strapdown.imu(sample.time_boot_us, f, w)
             self.earlier_imu, self.imu = self.imu, sample
+            if after is not None:
+                after.imu(self.strapdown)
+                self.after = None if after.has_faded else after
         elif isinstance(sample, (LocalPosition, Odometry)):
-            if isinstance(sample, LocalPosition):
-                self.history.add(sample)
             self.strapdown.velocity(sample)
-            self.validity.update(sample.time_boot_us)
+            if isinstance(sample, LocalPosition) and self.history.add(sample) and after is not None:
+                after.update(sample)
         elif isinstance(sample, GpsFix):
-            is_free = self.validity.is_valid and (self.estimate is None or self.estimate.is_final)
+            is_free = self.is_valid and (self.estimate is None or self.estimate.is_final)
             self.doppler.take(sample, self.strapdown, self.history.latest, is_free)
+            if after is not None:
+                after.measure(self.doppler)
         elif isinstance(sample, Attitude):
-            time_us = sample.time_boot_us
-            self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.tilt_error_rad(time_us))
+            most_wrong_rad = 0.0 if after is None else after.tilt_error_rad(sample.time_boot_us)
+            self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, most_wrong_rad)
 
     def begin(self, impact: Impact) -> ImpactEstimate:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
@@ -121,13 +128,11 @@ class ImpactEstimator(Motion):
             place = plus(latest.position_ned_m, 1e-6 * (free_until_us - latest.time_boot_us), velocity)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        came = velocity if self.validity.is_valid else ZERO
-        self.contact = self._contact_force(impact, came)
-        normal = normal_of(force_ned, came, self.hides_clipping)
+        self.contact = self._contact_force(impact, velocity)
+        normal = normal_of(force_ned, velocity, self.hides_clipping)
         if impact.evidence is Evidence.RATE_JUMP:
             # Of the way that the vehicle came.
             normal = Normal().with_direction(force_ned, APPROACH_RAD)
-        self.validity.invalidate(sample_us, math.hypot(*velocity))
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,
@@ -140,7 +145,22 @@ class ImpactEstimator(Motion):
             velocity_error_m_s=error_m_s,
             earlier=self.earlier_imu,
         )
+        if impact.is_collision:
+            self.follow_motion(estimate)
         return estimate
+
+    def follow_motion(self, estimate: ImpactEstimate) -> MotionEstimator:
+        """Begin to follow the motion after a collision; before it, too, where an earlier one is still corrected."""
+        before, first_us, normal = self.after, estimate.impact.sample_time_boot_us, estimate.normal
+        motion, error_m_s = MotionState(estimate.position_ned_m, estimate.velocity_ned_m_s), estimate.velocity_error_m_s
+        if before is not None and not before.is_valid:
+            motion, error_m_s = before.motion, before.spread_m_s
+        place, velocity = motion.position_ned_m, motion.velocity_ned_m_s
+        contact = Contact(place, velocity, away_from(normal.direction_ned), normal.error_rad, error_m_s)
+        expected, fits_models = contact.rebound(self.recovery.restitution), not self.hides_clipping
+        self.after = after = MotionEstimator(contact, first_us, expected, self.config, before, fits_models)
+        after.note_contact(estimate.is_fully_measured, first_us, normal, estimate.impulse_m_s)
+        return after
 
     def _contact_force(self, impact: Impact, came_ned_m_s: Vector3) -> ContactForce | None:
         """Of a contact that a turn shows the first force is still to come; one that a velocity shows is over."""
@@ -173,7 +193,9 @@ class ImpactEstimator(Motion):
         if contact is not None:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
             is_whole = contact.is_fully_measured(is_over)
-            self.validity.assess(is_whole)
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
+        if self.after is not None and self.after.hit_boot_us == estimate.impact.sample_time_boot_us:
+            is_whole, impulse_m_s = estimate.is_fully_measured, estimate.impulse_m_s
+            self.after.note_contact(is_whole, state.last_loud_boot_us, estimate.normal, impulse_m_s)

@@ -177,7 +177,7 @@ def _notices(monitor: CollisionMonitor, is_on: bool, fault: str | None, now_us: 
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
     estimate = monitor.estimator.estimate
     is_hit = estimate is not None and estimate.impact.is_collision
-    is_invalid = is_hit and not monitor.estimator.validity.is_valid
+    is_invalid = is_hit and not monitor.estimator.is_valid
     if is_invalid != monitor.invalidity_reported and monitor.state.phase is not Phase.CONTACT:
         monitor.invalidity_reported = is_invalid
         text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import LATEST_S, SHOWN_US
 from companion.motion.vector import ZERO, along, minus, unit
-from companion.reflex.config import FADED_US
 from companion.reflex.detection.confirmation import Hypothesis
 from companion.reflex.detection.detector import DetectorState, Phase
 from companion.reflex.detection.impact import ImpactEstimator
@@ -42,7 +41,6 @@ class CollisionRecord:
 
     detected_at_us: int
     detector: str
-    contact: Contact
     peak_specific_force_m_s2: float
     estimator: MotionEstimator
     source: ImpactEstimator
@@ -54,6 +52,10 @@ class CollisionRecord:
     rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
 
     @property
+    def contact(self) -> Contact:
+        return self.estimator.contact
+
+    @property
     def normal(self) -> Normal:
         """The obstacle's normal by all that is known now."""
         before_m_s, estimator = self.contact.velocity_ned_m_s, self.estimator
@@ -61,8 +63,8 @@ class CollisionRecord:
         normal = with_change(estimator.normal, before_m_s, estimator.after_ned_m_s, error_m_s)
         return Normal(away_from(normal.direction_ned), normal.error_rad)
 
-    def follow(self, state: DetectorState, positions: Sequence[LocalPosition]) -> None:
-        """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
+    def follow(self, state: DetectorState) -> None:
+        """Take the newest sample; the contact's largest force while it lasts."""
         strapdown, estimate, hit_us = self.source.strapdown, self.source.estimate, self.estimator.hit_boot_us
         # In these phases the state still describes the contact.
         is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
@@ -74,14 +76,6 @@ class CollisionRecord:
             self.hypothesis = None if is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == hit_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-            self.estimator.note_contact(
-                estimate.is_fully_measured, state.last_loud_boot_us, estimate.normal, estimate.impulse_m_s
-            )
-        self.estimator.imu(strapdown)
-        self.estimator.measure(self.source.doppler)
-        if self.is_over and (strapdown.time_boot_us - hit_us <= FADED_US or self.estimator.is_measured_apart):
-            for sample in positions:
-                self.estimator.update(sample)
 
     def is_rejected(self, now_boot_us: int) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""

@@ -11,7 +11,10 @@ weighted by the likelihood of its innovations (Magill 1965). Before the first re
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import InitVar, dataclass, field, replace
+
+import numpy as np
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion import config as numbers
@@ -37,15 +40,17 @@ class MotionEstimator:
     hit_boot_us: int  # its first sample
     start: MotionState  # the expected motion after it
     config: reflex.EstimateConfig
-    is_second: bool = False  # the error of an earlier hit was still being corrected
+    before: InitVar["MotionEstimator | None"] = None  # of an earlier hit
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
-    known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
+    is_second: bool = field(init=False)  # the error of an earlier hit was still being corrected
+    hardest_m_s: float = field(init=False)  # speed of the hit, or of such an earlier one
     motion: MotionState = field(init=False)
     normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # what is wrong of the vehicle's own estimate is known
-    external_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust
+    known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
+    external_m_s2: Vector3 = ZERO  # and by now
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
@@ -58,17 +63,24 @@ class MotionEstimator:
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
-    _time_boot_us: int = 0  # of the newest sample of the accelerometer
+    _time_boot_us: int = field(init=False)  # of the newest sample of the accelerometer
     _swings_m_s: float = 0.0  # standard deviation of its further swing, by the bank
     _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # with the measured one, by itself
     _same: Lasting = field(default_factory=Lasting)  # for how long the reported velocity has been the measured one
 
-    def __post_init__(self) -> None:
-        self.motion, self.pushed_boot_us, self.external_m_s2 = self.start, self.hit_boot_us, self.known_wind_m_s2
+    def __post_init__(self, before: "MotionEstimator | None") -> None:
+        self.hardest_m_s, self.is_second = math.hypot(*self.contact.velocity_ned_m_s), False
+        if before is not None and not before.is_valid:
+            self.hardest_m_s, self.is_second = max(self.hardest_m_s, before.hardest_m_s), True
+        self.motion, self.pushed_boot_us, self._time_boot_us = self.start, self.hit_boot_us, self.hit_boot_us
         self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
+
+    def note_wind(self, known_m_s2: Vector3) -> None:
+        """Take the horizontal specific force across the thrust of the last hover before the hit."""
+        self.known_wind_m_s2 = self.external_m_s2 = known_m_s2
 
     def _begin(self, impulse_m_s: float = 0.0) -> None:
         self._bank, self._measured, self._same = None, None, Lasting()
@@ -198,6 +210,35 @@ class MotionEstimator:
         self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
 
     @property
+    def is_valid(self) -> bool:
+        """Whether the vehicle's own estimate is right, its tilt, too: the hit was measured whole, or is long past."""
+        is_past = self._time_boot_us - self.hit_boot_us > reflex.CORRECTED_US
+        return self.is_fully_measured or (is_past and not self.is_measured_apart)
+
+    @property
+    def has_faded(self) -> bool:
+        """Whether nothing of it has to be known any more."""
+        return self._time_boot_us - self.hit_boot_us > reflex.FADED_US and not self.is_measured_apart
+
+    def tilt_error_rad(self, time_us: int) -> float:
+        """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
+        begun."""
+        is_right = self.is_valid or (not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
+        return 0.0 if is_right else numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s)
+
+    def correction_m_s(self, times_us: Sequence[int]) -> float:
+        """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
+        corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
+        What struck a vehicle that stood still may have done so at any speed."""
+        if self.is_valid:
+            return 0.0
+        if self.hardest_m_s < reflex.APPROACH_M_S or self.is_measured_apart:
+            return self.left_m_s
+        *earlier, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
+        swing_m_s = 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
+        return min(swing_m_s, self.left_m_s)
+
+    @property
     def is_measured_apart(self) -> bool:
         """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
         if self._measured is None or self.is_fully_measured or self._has_agreed:
@@ -248,7 +289,7 @@ class MotionEstimator:
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank by one report. What is wrong of it is known once the swing that is left is small enough."""
-        now_us, bank = self._time_boot_us or at_us, self._bank
+        now_us, bank = self._time_boot_us, self._bank
         before_us = self.hit_boot_us if bank is None else bank.time_boot_us
         if abs(now_us - at_us) > numbers.LONGEST_GAP_US or now_us <= before_us:
             # The report's time is outside the integrated interval.

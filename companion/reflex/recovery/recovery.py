@@ -69,7 +69,6 @@ class Recovery:
         """One position that the vehicle reports."""
         record = self.record
         is_rejected = record.is_rejected(sample.time_boot_us)
-        record.estimator.update(sample)
         self._touch(sample)
         rested_s = rebound_m_s = None
         if self.law.follows and (self.leans or not self.law.leans):

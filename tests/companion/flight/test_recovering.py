@@ -12,7 +12,7 @@ from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import FlightRoom
 from companion.flight.states import State
-from companion.messages import Attitude, AttitudeSetpoint, LandedState, LocalPosition, PositionSetpoint
+from companion.messages import Attitude, AttitudeSetpoint, ImuSample, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.config import SAME_M_S
 from companion.motion.doppler import Doppler
@@ -44,22 +44,10 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         contact = Contact(AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
-    source = reflex.monitor.estimator
-    reflex.newest = CollisionRecord(0, "fused", estimator.contact, 20.0, estimator, source)
+    source, reflex.monitor.estimator.after = reflex.monitor.estimator, estimator
+    reflex.newest = CollisionRecord(0, "fused", 20.0, estimator, source)
     flight.collisions.append(reflex.newest)
     return flight
-
-
-def test_what_is_left_of_one_hit_says_nothing_of_what_came_after_it():
-    flight = flight_with()
-    validity, flight.collisions[-1].estimator.has_converged = flight.reflex.monitor.estimator.validity, True
-    for later_us, left_m_s in ((0, SAME_M_S), (500_000, math.inf)):
-        validity.invalidate(HIT_US + later_us, 2.0)
-        # Measured whole until arms meet their stop
-        validity.assess(True)
-        validity.assess(False)
-        flight.reflex.follow([], 2.0, LandedState.IN_AIR)
-        assert validity.left_m_s == left_m_s
 
 
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
@@ -73,6 +61,9 @@ def hears(
     flight: FlightContext, recover: Recover, since_us: int, north_m: float, north_m_s: float, down_m: float = -2.0
 ):
     sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, down_m), (north_m_s, 0.0, 0.0))
+    source = flight.reflex.monitor.estimator
+    source.after.imu(Strapdown(time_boot_us=sample.time_boot_us))
+    source.update(sample)
     recover.step(flight, Inputs(positions=[sample]), since_us)
     target = recover.target(flight, since_us)
     assert target is not None
@@ -172,7 +163,7 @@ def test_the_normal_is_the_forces_until_the_velocity_after_the_contact_is_known(
     record.estimator.after_ned_m_s, record.estimator.after_error_m_s = after_ned_m_s, 0.05
     assert record.normal.direction_ned == pytest.approx(direction_ned, abs=0.02)
     # And where the velocity before it is not known, nothing is changed by it
-    record.contact = replace(record.contact, velocity_error_m_s=math.inf)
+    record.estimator.contact = replace(record.contact, velocity_error_m_s=math.inf)
     assert record.normal.direction_ned == (-half, -half, 0.0)
     record.estimator.note_contact(True, HIT_US, Normal(), 0.0)
     assert record.normal.direction_ned == ZERO
@@ -309,8 +300,8 @@ def test_what_a_receiver_shows_to_be_wrong_is_followed_after_the_recovery():
     record = flight.collisions[0]
     record.is_over = True
     wrong = LocalPosition(HIT_US + 13_000_000, (record.estimator.motion.position_ned_m[0] + 20.0, 0.0, -2.0), ZERO)
-    flight.reflex.monitor.estimator.strapdown.time_boot_us = wrong.time_boot_us
-    flight.reflex.follow([wrong], 2.0, LandedState.IN_AIR)
+    record.source.update(ImuSample(wrong.time_boot_us, ZERO, ZERO))
+    record.source.update(wrong)
     assert record.estimator.position_error_m[0] == pytest.approx(20.0)
 
 

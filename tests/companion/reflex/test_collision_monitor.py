@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
@@ -22,6 +23,7 @@ from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
+from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.reflex import Reflex
 
 STILL = (0.0, 0.0, 0.0)
@@ -186,10 +188,10 @@ def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, speed=0.0, left_m_s=math.i
         return north_m_s[t] + (error_m_s(t * 1e-6 - 2.0) if t > 2_000_000 else 0.0), 0.0, 0.0
 
     def look(t):
-        watch.monitor.estimator.validity.left_m_s = left_m_s
-        trusted.append(watch.monitor.estimator.validity.is_valid)
+        trusted.append(watch.monitor.estimator.is_valid)
 
-    watch.fly(round(seconds * 1e6), push, velocity, rates=rates, look=look)
+    with patch.object(MotionEstimator, "left_m_s", left_m_s):
+        watch.fly(round(seconds * 1e6), push, velocity, rates=rates, look=look)
     return watch.impacts, [(t, text) for t, kind, text in watch.told if kind == "estimate"], trusted
 
 
@@ -294,7 +296,7 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
         look=leans,
     )
     # Then it is the filter's in the one case and the vehicle's in the other
-    assert not watch.monitor.estimator.validity.is_valid
+    assert not watch.monitor.estimator.is_valid
     assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
 
 
@@ -323,6 +325,6 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     assert len(reflex.hits) == 1
     assert bool(rejected) is (force_m_s2 == 0.0)
     # And one that is taken back leaves nothing
-    assert not reflex.monitor.estimator.validity.is_valid
+    assert not reflex.monitor.estimator.is_valid
     reflex.take_back()
-    assert reflex.hits == [] and reflex.monitor.estimator.validity.is_valid
+    assert reflex.hits == [] and reflex.monitor.estimator.is_valid

@@ -25,9 +25,9 @@ WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, known_wind_m_s2=(0.0, 0.0, 0.0)):
     contact = Contact(AT, velocity, SOUTH, 0.2)
-    return MotionEstimator(
-        contact, HIT_US, contact.rebound(restitution), EstimateConfig(), False, fits, known_wind_m_s2
-    )
+    found = MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), None, fits)
+    found.note_wind(known_wind_m_s2)
+    return found
 
 
 def missing(since_s, late_s, rad_s, damping):
