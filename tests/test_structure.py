@@ -100,7 +100,7 @@ def test_how_the_reflex_decides_and_believes_stays_behind_its_door() -> None:
     # Values go through the door, and settings; to compare with other detectors the laboratory looks behind it.
     behind = ("classify", "confirmation", "crash", "free_flight", "fused", "jumps", "sustained_force")
     hidden = {f"companion.reflex.detection.{name}" for name in behind}
-    hidden |= {"companion.reflex.correction", "companion.reflex.recovery.motion_estimator"}
+    hidden |= {"companion.reflex.belief.filter_bank", "companion.reflex.belief.motion_estimator"}
     found = [
         f"{module} imports {name}"
         for module, names in imports_of_all().items()
@@ -236,7 +236,7 @@ FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 # Those that a derivation gives.
 DERIVED = {
     "reflex/detection/jumps.py": {3},  # axes; Student's t by degrees of freedom
-    "reflex/recovery/filter_bank.py": {3},  # axes
+    "reflex/belief/filter_bank.py": {3},  # axes
     "reflex/detection/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/detection/monitor.py": {3},  # shown decimals
     "reflex/detection/health.py": {3, 3600},  # shown decimals; seconds an hour

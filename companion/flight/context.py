@@ -23,7 +23,7 @@ from companion.motion.settling import Lasting
 from companion.motion.vector import ZERO, minus, plus
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.attitude_law import Lean
-from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.collision import Collision
 from companion.reflex.reflex import Reflex
 from companion.report import Event, ExpectationReport, JsonValue, Outcome
 
@@ -188,12 +188,12 @@ class FlightContext:
         return is_asked and self.tally.hits > 0 and not self.going_home
 
     @property
-    def collisions(self) -> list[CollisionRecord]:
+    def collisions(self) -> list[Collision]:
         """All so far."""
         return self.reflex.hits
 
     @property
-    def hits(self) -> list[CollisionRecord]:
+    def hits(self) -> list[Collision]:
         """Those since it was armed."""
         return self.reflex.hits[self.motors.earlier_hits :]
 

@@ -271,11 +271,11 @@ class Core(ABC, Generic[FlightT]):
         in a recovery by position its place.
         """
         flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
-        recovery, held_s = self.reflex.recovery, self.reflex.loss_s
+        hit, held_s = self.reflex.newest, self.reflex.loss_s
         misled_s, place_m = flight.vehicle.autopilot.misled_s, flight.vehicle.autopilot.last_place_m
-        if self._leans is None or latest is None or target is None or recovery is None:
+        if self._leans is None or latest is None or target is None or hit is None:
             return ()
-        since_s = 1e-6 * (self.reflex.sample_boot_us - recovery.record.estimator.hit_boot_us)
+        since_s = 1e-6 * (self.reflex.sample_boot_us - hit.estimator.hit_boot_us)
         left_s, lean, now_us = misled_s - since_s, target.lean, self.now_us - self.started_at_us
         if lean is None or held_s is None:
             # By a position from now on. An autopilot that brakes by itself receives it again until it flies well.

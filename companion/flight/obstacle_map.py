@@ -9,8 +9,7 @@ from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import LEAST_FREE_M, ObstacleMap
 from companion.messages import Vector3
 from companion.motion.vector import minus, plus
-from companion.reflex.recovery.laws import Contact
-from companion.reflex.surface import Normal, Surface
+from companion.reflex.surface import Contact, Normal, Surface
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:

@@ -14,7 +14,7 @@ from companion.memory.patch import LEAST_SPEED_M_S
 from companion.messages import NamedValue, Severity, StatusText, Vector3
 from companion.reflex.detection.detector import Phase
 from companion.reflex.detection.monitor import CollisionMonitor
-from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.collision import Collision
 from companion.report import Event
 
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
@@ -87,7 +87,7 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
 
 
 def values(
-    state: Enum, monitor: CollisionMonitor, latest: CollisionRecord | None, hits: int, time_us: int
+    state: Enum, monitor: CollisionMonitor, latest: Collision | None, hits: int, time_us: int
 ) -> list[NamedValue]:
     """The state's and the detector's numbers: of a state and a phase its place among all, of one without data -1."""
     phase = float(list(Phase).index(monitor.state.phase)) if monitor.no_data_reason is None else -1.0

@@ -1,6 +1,6 @@
 """The door of the reflex: samples in; what was touched, and the way to rest from it, out.
 
-A step of a flight calls `step` with its samples, `begin` for a collision that it recovers from, `recovery.take` with
+A step of a flight calls `step` with its samples, `begin` for a collision that it recovers from, `newest.take` with
 each position until the vehicle rests, and `follow` at the end. Pure: the same calls give the same bits.
 """
 
@@ -22,9 +22,8 @@ from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.detection.monitor import CollisionMonitor, CollisionMonitorConfig, Notice, advance, start_monitor
 from companion.reflex.detection.sustained_force import SustainedForceMonitor
 from companion.reflex.recovery.attitude_law import Lean, wanted
-from companion.reflex.recovery.collision import CollisionRecord
+from companion.reflex.recovery.collision import Collision, Room
 from companion.reflex.recovery.laws import RECOVERY_LAWS, Law
-from companion.reflex.recovery.recovery import Recovery, Room
 from companion.reflex.surface import Surface
 
 
@@ -56,9 +55,8 @@ class Reflex:
     law_config: numbers.RecoveryConfig
     settled: SettledConfig
     monitor: CollisionMonitor = field(init=False)
-    hits: list[CollisionRecord] = field(default_factory=list)
-    newest: CollisionRecord | None = None  # of them, since the vehicle started
-    recovery: Recovery | None = None  # of the newest
+    hits: list[Collision] = field(default_factory=list)
+    newest: Collision | None = None  # of them, since the vehicle started
     loss_s: float | None = None  # for so long the vehicle flies its last setpoint on; infinite: it takes no thrust
     keeps_trim: bool = False  # see interface.Autopilot
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
@@ -137,23 +135,24 @@ class Reflex:
 
     # --- the way to rest
 
-    def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> CollisionRecord:
+    def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> Collision:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
         impact, earlier, source = estimate.impact, self.in_one_recovery(), self.monitor.estimator
         estimator = source.after
         if estimator is None or estimator.hit_boot_us != impact.sample_time_boot_us:
             estimator = source.follow_motion(estimate)  # what holds the vehicle no detector has seen
         estimator.note_wind(self.sustained_force.hover_wind_m_s2)
-        record = CollisionRecord(now_us, self.config.detector, impact.size_m_s2, estimator, source)
-        if not earlier and self._is_attitude_heard:
-            force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
-            record.hypothesis = hypothesis_of(estimate, force_ned, self.config.estimate.imu_averaging_interval_s)
         clearance_m = self.law_config.clearance_m
         surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
-        self.recovery = Recovery(record, self.law, self.law_config, self.settled, room, surfaces, self.keeps_trim)
-        self.hits.append(record)
-        self.newest = record
-        return record
+        shown = self.config.detector, impact.size_m_s2, source, estimator
+        how = self.law, self.law_config, self.settled
+        self.newest = Collision(now_us, *shown, *how, room, surfaces, self.keeps_trim)
+        if not earlier and self._is_attitude_heard:
+            force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
+            averaging_s = self.config.estimate.imu_averaging_interval_s
+            self.newest.hypothesis = hypothesis_of(estimate, force_ned, averaging_s)
+        self.hits.append(self.newest)
+        return self.newest
 
     def take_back(self) -> None:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
@@ -166,12 +165,12 @@ class Reflex:
 
         What PX4 holds goes on while it turns its thrust.
         """
-        recovery = self.recovery
-        assert recovery is not None and self.loss_s is not None, "only a known one lets it lean"
-        belief = recovery.record.estimator.belief(recovery.record.source.strapdown)
+        hit = self.newest
+        assert hit is not None and self.loss_s is not None, "only a known one lets it lean"
+        belief = hit.estimator.belief(hit.source.strapdown)
         held_s = self.loss_s + numbers.NOTICED_S + numbers.LEAD_S
-        acceleration = wanted(belief, recovery.surfaces, recovery.record.setpoint_ned_m[2])
-        return acceleration, Lean(belief, recovery.surfaces, self.monitor.state.thrust.full_m_s2, held_s)
+        acceleration = wanted(belief, hit.surfaces, hit.setpoint_ned_m[2])
+        return acceleration, Lean(belief, hit.surfaces, self.monitor.state.thrust.full_m_s2, held_s)
 
     def follow(self, samples: Sequence[Sample], height_m: float | None, landed: LandedState) -> None:
         """Take the samples of the step for what confirms the newest hit, and for what shows a crash."""
@@ -230,7 +229,7 @@ class Reflex:
 
     # --- what is known
 
-    def in_one_recovery(self) -> list[CollisionRecord]:
+    def in_one_recovery(self) -> list[Collision]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
 

@@ -11,10 +11,10 @@ from companion.messages import ImuSample, LandedState, LocalPosition, Odometry, 
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import EstimateConfig
 from companion.reflex.detection.confirmation import Hypothesis
-from companion.reflex.recovery.laws import Contact
-from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.surface import Contact
 from tests.companion.fake_vehicle import LOITER, flying_in, hovering
 from tests.companion.hostile import attacked
 
@@ -80,7 +80,7 @@ def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit
     # When its estimate jumps by 3 m north
     f.vehicle.position[0] += 3.0
     if is_wrong:
-        contact = Contact(before_m, (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+        contact = Contact((0.0, 0.0, -2.0), (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
         after = MotionEstimator(contact, f.vehicle.time_us, contact.rebound(0.45), EstimateConfig())
         f.companion.core.reflex.monitor.estimator.after = after
     attacked(f, [counted(1, 1000), counted(1, 2000)])

@@ -17,7 +17,8 @@ from companion.messages import ComputerStatus
 from companion.shell import computer
 from companion.shell.service_manager import STATUS_EVERY_US, ServiceManager, service_manager
 
-Usage, Memory = namedtuple("Usage", "total used free"), namedtuple("Memory", "total available free")
+Usage = namedtuple("Usage", "total used free")
+Memory = namedtuple("Memory", "total available free")
 Zone = namedtuple("Zone", "current")
 MIB, GIB = 1 << 20, 1 << 30
 

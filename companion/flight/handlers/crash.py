@@ -42,10 +42,8 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
 
 def _is_pressed(flight: FlightContext, now_us: int) -> bool:
     """Whether the time for the recovery is over, and the vehicle is still where it touches."""
-    hits, recovery = flight.reflex.in_one_recovery(), flight.reflex.recovery
-    timeout_us = flight.mission.companion.settled.timeout_s * 1e6
-    is_late = bool(hits) and now_us - hits[-1].detected_at_us > timeout_us
-    return is_late and recovery is not None and recovery.is_pressed
+    hits, timeout_us = flight.reflex.in_one_recovery(), flight.mission.companion.settled.timeout_s * 1e6
+    return bool(hits) and now_us - hits[-1].detected_at_us > timeout_us and hits[0].is_pressed
 
 
 class Crashed(Handler[FlightContext]):

@@ -4,7 +4,7 @@ from companion.flight.after_hit import take_back
 from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
 from companion.reflex.detection.impact import ImpactEstimate
-from companion.reflex.recovery.recovery import Progress
+from companion.reflex.recovery.collision import Progress
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
@@ -36,22 +36,22 @@ class Recover(Handler[FlightT]):
     """Fly to rest after the newest collision, and wait until the vehicle has settled."""
 
     def __init__(self, flight: FlightT, now_us: int) -> None:
-        assert flight.reflex.recovery is not None, "a collision begins one"
-        self._recovery = flight.reflex.recovery
+        assert flight.reflex.newest is not None, "a collision begins a recovery"
+        self._hit = flight.reflex.newest
         self._first_hit = flight.reflex.in_one_recovery()[-1]
 
     def target(self, flight: FlightT, now_us: int) -> Target | None:
         """Attitude and thrust until it rests; then its place."""
-        place = self._recovery.record.setpoint_ned_m
+        place = self._hit.setpoint_ned_m
         yaw_rad = flight.heading_towards()
-        if not self._recovery.leans:
+        if not self._hit.leans:
             return Target(place, yaw_rad)
         acceleration, lean = flight.reflex.lean()
         return Target(place, yaw_rad, None, acceleration, lean)
 
     def step(self, flight: FlightT, inputs: Inputs, now_us: int) -> Transition | None:
         for sample in inputs.positions:
-            shown = self._recovery.take(sample)
+            shown = self._hit.take(sample)
             transition = take_back(flight, now_us) if shown.is_rejected else None
             if transition is not None:
                 return transition
@@ -66,7 +66,7 @@ class Recover(Handler[FlightT]):
         return None
 
     def _tell(self, flight: FlightT, shown: Progress, now_us: int) -> None:
-        record, place = self._recovery.record, self._recovery.record.setpoint_ned_m
+        place = self._hit.setpoint_ned_m
         if shown.rested_s is not None:
             text = f"at rest; by position from here on, {shown.rested_s:.2f} s after the hit"
             flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
@@ -76,13 +76,13 @@ class Recover(Handler[FlightT]):
             text = f"{way} the obstacle at {abs(off_m_s):.2f} m/s; recovery setpoint {goal}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
         if shown.settled_s is not None:
-            past_m, speed_m_s = record.overshoot_m, record.rebound_speed_m_s
+            past_m, speed_m_s = self._hit.overshoot_m, self._hit.rebound_speed_m_s
             text = f"recovered: settled {shown.settled_s:.2f} s after the hit, overshoot {past_m * 100:.1f} cm"
             text += "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
             flight.report(now_us, "recovered", text, settled_after_s=shown.settled_s, overshoot_m=past_m)
 
     def _leave(self, flight: FlightT) -> Transition:
         """What follows begins at rest at the setpoint."""
-        self._recovery.record.is_over = True
-        flight.target = Target(self._recovery.record.setpoint_ned_m, flight.yaw_rad)
+        self._hit.is_over = True
+        flight.target = Target(self._hit.setpoint_ned_m, flight.yaw_rad)
         return flight.after_recovery

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from companion.messages import MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.detection.free_flight import ThrustGain
-from companion.reflex.recovery.motion_estimator import MotionEstimator
 
 
 class Phase(Enum):

@@ -8,11 +8,10 @@ from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus, unit
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import APPROACH_RAD, CLIPPED_SHARE, SHORT, EstimateConfig, RecoveryConfig
 from companion.reflex.detection.detector import DetectorState, Evidence, Impact, Motion, Phase
-from companion.reflex.recovery.laws import Contact, MotionState
-from companion.reflex.recovery.motion_estimator import MotionEstimator
-from companion.reflex.surface import Normal, away_from, normal_of
+from companion.reflex.surface import Contact, MotionState, Normal, away_from, normal_of
 
 
 @dataclass(slots=True)

@@ -18,25 +18,10 @@ from dataclasses import dataclass, replace
 from companion.messages import AttitudeSetpoint, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO, along, flat, limited, minus, plus, unit
 from companion.reflex import config as reflex
+from companion.reflex.belief.motion_estimator import Belief
 from companion.reflex.surface import Surface, projected
-
-
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """The vehicle's motion and attitude as the companion knows them; local NED, body FRD."""
-
-    position_ned_m: Vector3
-    velocity_ned_m_s: Vector3
-    spread_m_s: float = 0.0  # standard deviation of the velocity
-    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
-    external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind and drag
-    attitude_wxyz: Quaternion = LEVEL
-    yaw_rate_rad_s: float = 0.0
-    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude
-    heading_error_rad: float = 0.0  # of the vehicle's own attitude
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,34 +19,7 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.vector import flat, plus, split
 from companion.reflex.config import WAY_S, RecoveryConfig
-
-
-@dataclass(frozen=True, slots=True)
-class MotionState:
-    """Position and velocity, local NED."""
-
-    position_ned_m: Vector3
-    velocity_ned_m_s: Vector3
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """The vehicle at the time of contact t_c: x(t_c), v_c, and the obstacle's outward normal; NED, SI.
-
-    The normal is horizontal, or the obstacle's own where that is steep (see surface.away_from); zero: not known.
-    """
-
-    position_ned_m: Vector3
-    velocity_ned_m_s: Vector3
-    normal_ned: Vector3
-    normal_error_rad: float = 0.0
-    velocity_error_m_s: float = 0.0  # standard deviation on an axis
-
-    def rebound(self, restitution: float) -> MotionState:
-        """The motion after it, as far as that can be known before it has been measured."""
-        into_m_s, tangential = split(self.velocity_ned_m_s, self.normal_ned)
-        back_m_s = max(into_m_s, -restitution * into_m_s)
-        return MotionState(self.position_ned_m, plus(tangential, back_m_s, self.normal_ned))
+from companion.reflex.surface import Contact, MotionState
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,7 +70,7 @@ def test_no_hit_that_is_seen_through_a_filter_counts_as_measured_whole(vehicle, 
     # And no model of PX4's estimator says when the vehicle's own velocity is right again
     assert reflex.hits[-1].estimator.fits_models is may_be_whole
     # Its integrators begin with the tilt that was asked for last, PX4's with none
-    assert reflex.recovery.rests_s == (0.1 if may_be_whole else 0.5)
+    assert reflex.newest.rests_s == (0.1 if may_be_whole else 0.5)
 
 
 # --- by attitude

@@ -18,13 +18,11 @@ from companion.motion.config import SAME_M_S
 from companion.motion.doppler import Doppler
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import NOTICED_S, EstimateConfig
 from companion.reflex.detection.detector import Impact
-from companion.reflex.recovery.collision import CollisionRecord
-from companion.reflex.recovery.laws import Contact, MotionState
-from companion.reflex.recovery.motion_estimator import MotionEstimator
-from companion.reflex.recovery.recovery import Recovery
-from companion.reflex.surface import Normal, Surface
+from companion.reflex.recovery.collision import Collision
+from companion.reflex.surface import Contact, MotionState, Normal, Surface
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -45,15 +43,15 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     source, reflex.monitor.estimator.after = reflex.monitor.estimator, estimator
-    reflex.newest = CollisionRecord(0, "fused", 20.0, estimator, source)
+    how = reflex.law, mission.recovery, mission.companion.settled
+    reflex.newest = Collision(0, "fused", 20.0, source, estimator, *how, FlightRoom(flight))
     flight.collisions.append(reflex.newest)
     return flight
 
 
 def recover_in(flight: FlightContext, *earlier: Surface) -> Recover:
-    reflex, mission = flight.reflex, flight.mission
-    how = reflex.law, mission.recovery, mission.companion.settled
-    reflex.recovery = Recovery(flight.collisions[-1], *how, FlightRoom(flight), earlier, reflex.keeps_trim)
+    reflex, hit = flight.reflex, flight.collisions[-1]
+    reflex.newest = flight.collisions[-1] = replace(hit, law=reflex.law, earlier=earlier, keeps_trim=reflex.keeps_trim)
     return Recover(flight, 0)
 
 
@@ -93,17 +91,17 @@ def test_who_has_passed_the_end_of_an_obstacle_is_neither_driven_back_before_it_
         hears(flight, recover, since_us, 3.3 + 1e-6 * since_us, 1.0)
     record = flight.collisions[-1]
     assert record.setpoint_ned_m[0] > 4.1
-    assert not flight.reflex.recovery.is_pressed
+    assert not flight.reflex.newest.is_pressed
     # But where it is touched again it is there again
     record.estimator.note_contact(True, HIT_US + 900_000, record.estimator.normal, 0.0)
     for since_us in (900_000, 1_000_000):
         hears(flight, recover, since_us, 4.2, 0.0)
     assert record.setpoint_ned_m[0] == pytest.approx(4.2 - 0.35, abs=0.05)
-    assert flight.reflex.recovery.is_pressed
+    assert flight.reflex.newest.is_pressed
     # And who hovers just off it, as in a gap, has left it
     for since_us in range(1_100_000, 1_500_000, 20_000):
         hears(flight, recover, since_us, 4.15, -0.1)
-    assert not flight.reflex.recovery.is_pressed
+    assert not flight.reflex.newest.is_pressed
 
 
 @pytest.mark.parametrize("law", ["normal", "paper"])

@@ -26,10 +26,10 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
+from companion.reflex.belief.motion_estimator import Belief
 from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
-from companion.reflex.recovery.attitude_law import Belief, Lean
-from companion.reflex.recovery.laws import MotionState
-from companion.reflex.surface import Surface
+from companion.reflex.recovery.attitude_law import Lean
+from companion.reflex.surface import MotionState, Surface
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import LAND, LANDING, LOITER, TAKEOFF, FakeVehicle, flight, flying_in, hovering
 from tests.companion.hostile import HEARD, STATES, Attacker, attacked

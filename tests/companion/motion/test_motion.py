@@ -15,9 +15,9 @@ from companion.motion.rotation import tilt_rad, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, plus
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import EstimateConfig
-from companion.reflex.recovery.laws import Contact
-from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.surface import Contact
 
 CONTACT_US = 10_000_000
 

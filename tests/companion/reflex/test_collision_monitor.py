@@ -19,11 +19,11 @@ from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
-from companion.reflex.recovery.motion_estimator import MotionEstimator
 from companion.reflex.reflex import Reflex
 
 STILL = (0.0, 0.0, 0.0)
@@ -317,8 +317,8 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
         for estimate in reflex.step(samples, IN_FLIGHT, us).collisions:
             assert us == 3_000_000, "told with the first sample that shows it"
             reflex.begin(estimate, room, us)
-        if reflex.recovery is not None:
-            shown = [reflex.recovery.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
+        if reflex.newest is not None:
+            shown = [reflex.newest.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
             rejected += [progress for progress in shown if progress.is_rejected]
         reflex.follow(samples, 2.0, LandedState.IN_AIR)
     # Then the jump alone was none, and with a force of the same time it was a hit

@@ -11,9 +11,9 @@ from companion.messages import Attitude, LocalPosition
 from companion.motion.config import CURRENT_US, SAME_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
+from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import TILT_PER_S, EstimateConfig
-from companion.reflex.recovery.laws import Contact, MotionState
-from companion.reflex.recovery.motion_estimator import MotionEstimator
+from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
 NORTH = (1.0, 0.0, 0.0)

@@ -14,6 +14,7 @@ from companion.flight.obstacle_map import FlightRoom
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
+from companion.reflex.belief.motion_estimator import Belief
 from companion.reflex.config import (
     LEAD_S,
     LEAST_THRUST,
@@ -25,9 +26,9 @@ from companion.reflex.config import (
     WAY_S,
     RecoveryConfig,
 )
-from companion.reflex.recovery.attitude_law import Belief, Lean, attitude_and_thrust, held_off, tilted, wanted
-from companion.reflex.recovery.laws import RECOVERY_LAWS, Contact
-from companion.reflex.surface import Surface, projected
+from companion.reflex.recovery.attitude_law import Lean, attitude_and_thrust, held_off, tilted, wanted
+from companion.reflex.recovery.laws import RECOVERY_LAWS
+from companion.reflex.surface import Contact, Surface, projected
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
 ALL_SPEEDS = (0.5, 1.0, 2.0, 3.5, 5.0)

@@ -244,7 +244,7 @@ def test_a_recovery_begins_with_the_wind_of_the_hover_before_it():
     flight.run_to("recovering")
     # Then the first attitude off the wall stands against that wind, and not against what speed made of it
     airframe, reflex = load_built_in("foldable"), flight.companion.core.reflex
-    known, wind_m_s2 = reflex.recovery.record.estimator.wind_m_s2, 4.0 * airframe.drag_n_s_m / airframe.mass_kg
+    known, wind_m_s2 = reflex.newest.estimator.wind_m_s2, 4.0 * airframe.drag_n_s_m / airframe.mass_kg
     assert known == pytest.approx((0.0, wind_m_s2, 0.0), abs=0.1)
     # And what it feels at rest in the recovery, a wall perhaps, is no wind of the next hit
     flight.run_for(1.4)

@@ -5,7 +5,7 @@ position, until other sensors correct both. At a time t after the hit the vehicl
 
     v(t) + e g(t),    x(t) + e G(t)
 
-for its velocity v and position x, where e is the error just after the hit (see `correction`). Between two reports the
+for its velocity v and position x, where e is the error just after the hit (see `filter_bank`). Between two reports the
 accelerometer is integrated. A bank of Kalman filters estimates x, v and e, each by one hypothesis of g and G, and
 weighted by the likelihood of its innovations (Magill 1965). Before the first report v is the expected rebound.
 """
@@ -16,20 +16,32 @@ from dataclasses import InitVar, dataclass, field, replace
 
 import numpy as np
 
-from companion.messages import LocalPosition, Vector3
+from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion import config as numbers
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
 from companion.motion.doppler import Doppler, MeasuredVelocity
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.settling import Lasting
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
 from companion.reflex import config as reflex
-from companion.reflex.correction import error_response
-from companion.reflex.recovery.attitude_law import Belief
-from companion.reflex.recovery.filter_bank import FilterBank
-from companion.reflex.recovery.laws import Contact, MotionState
-from companion.reflex.surface import Normal, away_from
+from companion.reflex.belief.filter_bank import FilterBank, error_response
+from companion.reflex.surface import Contact, MotionState, Normal, away_from
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """The vehicle's motion and attitude as the companion knows them; local NED, body FRD."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    spread_m_s: float = 0.0  # standard deviation of the velocity
+    tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
+    external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind and drag
+    attitude_wxyz: Quaternion = LEVEL
+    yaw_rate_rad_s: float = 0.0
+    level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude
+    heading_error_rad: float = 0.0  # of the vehicle's own attitude
 
 
 @dataclass(slots=True)
