@@ -274,6 +274,11 @@ def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
     assert trusted.count(False) <= 2
 
 
+def test_what_a_hit_has_left_is_forgotten_once_it_is_long_past():
+    watch = Watch().fly(15_000_000, push=lambda t: (-120.0 if 2_000_000 <= t < 2_012_000 else 0.0, 0.0, 0.0))
+    assert len(watch.impacts) == 1 and watch.monitor.estimator.after is None
+
+
 @pytest.mark.parametrize(("turns", "leans_m_s2"), [(False, 9.80665 * math.tan(math.radians(4.0))), (True, 0.0)])
 def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
     """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""

@@ -8,11 +8,11 @@ import pytest
 
 from companion.flight.context import Inputs
 from companion.messages import Attitude, LocalPosition
-from companion.motion.config import CURRENT_US, SAME_M_S
+from companion.motion.config import CURRENT_US, SAME_M_S, TILT_RAD_PER_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
 from companion.reflex.belief.motion_estimator import MotionEstimator
-from companion.reflex.config import TILT_PER_S, EstimateConfig
+from companion.reflex.config import CORRECTED_US, FADED_US, TILT_PER_S, UNCORRECTED_US, EstimateConfig
 from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
@@ -28,6 +28,26 @@ def reckoned(velocity=(2.0, 0.0, 0.0), restitution=0.2, fits=True, known_wind_m_
     found = MotionEstimator(contact, HIT_US, contact.rebound(restitution), EstimateConfig(), None, fits)
     found.note_wind(known_wind_m_s2)
     return found
+
+
+@pytest.mark.parametrize(("later_us", "is_second"), [(1_000_000, True), (CORRECTED_US + 1_000_000, False)])
+def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_corrected(later_us, is_second):
+    # Given a clipped hit at 3 m/s, and one at 1 m/s later
+    first, next_us = reckoned((3.0, 0.0, 0.0)), HIT_US + later_us
+    first.imu(Strapdown(time_boot_us=next_us))
+    contact = Contact(AT, (1.0, 0.0, 0.0), SOUTH, 0.2)
+    found = MotionEstimator(contact, next_us, contact.rebound(0.45), EstimateConfig(), first)
+    # Then the tilt may be wrong by the harder of both, at once; else by its own, once the correction can have begun
+    tilts_rad = [found.tilt_error_rad(next_us + since_us) for since_us in (UNCORRECTED_US - 1, UNCORRECTED_US)]
+    own_rad, both_rad = 2.0 * TILT_RAD_PER_M_S, 4.0 * TILT_RAD_PER_M_S
+    assert tilts_rad == pytest.approx([both_rad, both_rad] if is_second else [0.0, own_rad])
+    # And a contact that was measured whole leaves the estimate valid after none
+    found.note_contact(True, next_us, found.normal, 0.0)
+    assert found.is_valid is not is_second
+    # Until it is long past
+    for since_us, is_valid, has_faded in ((CORRECTED_US + 1, True, False), (FADED_US + 1, True, True)):
+        found.imu(Strapdown(time_boot_us=next_us + since_us))
+        assert (found.is_valid, found.has_faded) == (is_valid, has_faded)
 
 
 def missing(since_s, late_s, rad_s, damping):
