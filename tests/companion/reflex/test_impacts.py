@@ -31,13 +31,15 @@ def approaching(acceleration_m_s2=0.0):
     return estimator
 
 
-def begun(estimator):
-    return estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, 0.0, 0.0)))
+def begun(estimator, kind=ImpactKind.WALL):
+    return estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, 0.0, 0.0), kind))
 
 
 @pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])
 def test_place_and_velocity_of_a_clean_approach_are_those_of_the_contact(acceleration):
-    estimate = begun(approaching(acceleration))
+    estimate, after = begun(estimator := approaching(acceleration)), estimator.after
+    begun(estimator, ImpactKind.CONTACT)
+    assert estimator.after is after, "a hand's touch hides nothing"
     assert estimate.velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.05)
     assert estimate.position_ned_m == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
 

@@ -39,8 +39,7 @@ def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_co
     found = MotionEstimator(contact, next_us, contact.rebound(0.45), EstimateConfig(), first)
     # Then the tilt may be wrong by the harder of both, at once; else by its own, once the correction can have begun
     tilts_rad = [found.tilt_error_rad(next_us + since_us) for since_us in (UNCORRECTED_US - 1, UNCORRECTED_US)]
-    own_rad, both_rad = 2.0 * TILT_RAD_PER_M_S, 4.0 * TILT_RAD_PER_M_S
-    assert tilts_rad == pytest.approx([both_rad, both_rad] if is_second else [0.0, own_rad])
+    assert tilts_rad == pytest.approx([4.0 * TILT_RAD_PER_M_S] * 2 if is_second else [0.0, 2.0 * TILT_RAD_PER_M_S])
     # And a contact that was measured whole leaves the estimate valid after none
     found.note_contact(True, next_us, found.normal, 0.0)
     assert found.is_valid is not is_second
