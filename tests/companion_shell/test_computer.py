@@ -34,9 +34,8 @@ def test_the_computers_status_is_in_the_messages_units_with_its_hottest_zone_if_
     monkeypatch.setattr(computer.psutil, "virtual_memory", lambda: Memory(3792 * MIB, 2980 * MIB, 10 * MIB))
     monkeypatch.setattr(computer.psutil, "disk_usage", lambda folder: Usage(30 * GIB, 0, 20 * GIB))
     monkeypatch.setattr(computer.time, "clock_gettime", lambda clock: 90.5)
-    # Then
-    status = computer.computer_status(tmp_path, 1_000)
-    assert status == ComputerStatus(1_000, 90_500, (0, 100), told, 812, 3792, 10 * 1024, 30 * 1024)
+    known = ComputerStatus(1_000, 90_500, (0, 100), told, 812, 3792, 10 * 1024, 30 * 1024)
+    assert computer.computer_status(tmp_path, 1_000) == known
 
 
 def test_this_computer_has_a_status(tmp_path):

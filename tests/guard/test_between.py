@@ -127,7 +127,7 @@ def test_after_a_restart_of_the_guard_in_flight_a_program_flies_when_it_asks_for
     # Until it asks for OFFBOARD
     air.set_mode(OFFBOARD)
     air.run_until(lambda: air.mode == "OFFBOARD", 1.0)
-    assert air.sent_by("program", "SET_", again_s) != []
+    assert air.sent_by("program", "SET_", again_s) != [] and not air.between.has_chosen
 
 
 def test_after_a_restart_in_flight_a_pilots_switch_chooses_and_an_onboard_computers_sticks_do_not():

@@ -249,6 +249,7 @@ BEFORE_THE_HIT = [
     ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, True, "2.0"),
     ({"no_collision": None}, False, "hit at"),
     ({"no_collision": {"for_s": 0.5}}, True, "none"),
+    ({"no_collision": {"for_s": 60}}, False, "hit at"),
 ]
 AFTER_IT = [
     ({"no_collision": {}}, True, "none until the end"),

@@ -94,8 +94,10 @@ def test_what_is_not_finite_is_a_fault_and_nothing_else(broken):
             spoilt: dict[str, Any] = {part: tuple(values)}
             with pytest.raises(SetpointError):
                 bounded(replace(good, **spoilt), around(), FENCE, LIMITS)
-    with pytest.raises(SetpointError):
-        bounded(replace(good, yaw_rad=broken), around(), FENCE, LIMITS)
+    leans = Lean(Belief((0.0, 0.0, -1.5), (0.0, 0.0, 0.0), yaw_rate_rad_s=broken), (), 16.0, 0.4)
+    for wrong in (replace(good, yaw_rad=broken), replace(good, lean=leans)):
+        with pytest.raises(SetpointError):
+            bounded(wrong, around(), FENCE, LIMITS)
 
 
 @given(POINT, POINT, st.one_of(st.none(), POINT))

@@ -43,7 +43,6 @@ def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_co
     # And a contact that was measured whole leaves the estimate valid after none
     found.note_contact(True, next_us, found.normal, 0.0)
     assert found.is_valid is not is_second
-    # Until it is long past
     for since_us, is_valid, has_faded in ((CORRECTED_US + 1, True, False), (FADED_US + 1, True, True)):
         found.imu(Strapdown(time_boot_us=next_us + since_us))
         assert (found.is_valid, found.has_faded) == (is_valid, has_faded)
