@@ -138,9 +138,9 @@ class Reflex:
     def begin(self, estimate: ImpactEstimate, room: Room, now_us: int) -> Collision:
         """Record a collision, and begin to recover from it: the motion just before it, and the goal by that."""
         impact, earlier, source = estimate.impact, self.in_one_recovery(), self.monitor.estimator
-        estimator = source.after
-        if estimator is None or estimator.hit_boot_us != impact.sample_time_boot_us:
-            estimator = source.follow_motion(estimate)  # what holds the vehicle no detector has seen
+        # What holds the vehicle no detector has seen.
+        estimator = estimate.after or source.motion_after(estimate)
+        source.followed = [estimator]
         estimator.note_wind(self.sustained_force.hover_wind_m_s2)
         clearance_m = self.law_config.clearance_m
         surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
@@ -158,7 +158,7 @@ class Reflex:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
         self.hits.pop()
         self.newest = next((each for each in self.hits[-1:] if each.source is self.monitor.estimator), None)
-        self.monitor.estimator.after = None
+        self.monitor.estimator.followed.clear()
 
     def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.

@@ -82,7 +82,7 @@ def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit
     if is_wrong:
         contact = Contact((0.0, 0.0, -2.0), (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
         after = MotionEstimator(contact, f.vehicle.time_us, contact.rebound(0.45), EstimateConfig())
-        f.companion.core.reflex.monitor.estimator.after = after
+        f.companion.core.reflex.monitor.estimator.followed = [after]
     attacked(f, [counted(1, 1000), counted(1, 2000)])
     f.run_for(1.0)
     if is_wrong:

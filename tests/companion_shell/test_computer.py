@@ -7,7 +7,7 @@ import os
 import socket
 import threading
 import uuid
-from collections import namedtuple
+from types import SimpleNamespace as Of
 
 import pytest
 
@@ -17,31 +17,24 @@ from companion.messages import ComputerStatus
 from companion.shell import computer
 from companion.shell.service_manager import STATUS_EVERY_US, ServiceManager, service_manager
 
-Usage = namedtuple("Usage", "total used free")
-Memory = namedtuple("Memory", "total available free")
-Zone = namedtuple("Zone", "current")
 MIB, GIB = 1 << 20, 1 << 30
 
 
-@pytest.mark.parametrize(("celsius", "told"), [((48.3, 61.2), 61), ((), None)])
-def test_the_computers_status_is_in_the_messages_units_with_its_hottest_zone_if_there_is_one(
-    celsius, told, tmp_path, monkeypatch
-):
-    # Given 10 of 30 GiB and 812 of 3792 MiB in use, and what caches hold is not used
-    zones = {f"zone{number}": [Zone(each)] for number, each in enumerate(celsius)}
-    monkeypatch.setattr(computer.psutil, "sensors_temperatures", lambda: zones)
-    monkeypatch.setattr(computer.psutil, "cpu_percent", lambda percpu: [0.4, 99.6])
-    monkeypatch.setattr(computer.psutil, "virtual_memory", lambda: Memory(3792 * MIB, 2980 * MIB, 10 * MIB))
-    monkeypatch.setattr(computer.psutil, "disk_usage", lambda folder: Usage(30 * GIB, 0, 20 * GIB))
-    monkeypatch.setattr(computer.time, "clock_gettime", lambda clock: 90.5)
-    known = ComputerStatus(1_000, 90_500, (0, 100), told, 812, 3792, 10 * 1024, 30 * 1024)
-    assert computer.computer_status(tmp_path, 1_000) == known
-
-
-def test_this_computer_has_a_status(tmp_path):
+def test_the_computers_status_is_in_the_messages_units_with_its_hottest_zone_if_there_is_one(tmp_path, monkeypatch):
     status = computer.computer_status(tmp_path, 0)
     assert len(status.cpu_percent) == os.cpu_count() and status.uptime_ms > 0
     assert 0 < status.memory_used_mib < status.memory_total_mib and 0 < status.disk_used_mib <= status.disk_total_mib
+    zones = {"board": [Of(current=48.3)], "core": [Of(current=61.2)]}
+    memory, disk = Of(total=3792 * MIB, available=2980 * MIB, free=10 * MIB), Of(total=30 * GIB, used=0, free=20 * GIB)
+    monkeypatch.setattr(computer.psutil, "sensors_temperatures", lambda: zones)
+    monkeypatch.setattr(computer.psutil, "cpu_percent", lambda percpu: [0.4, 99.6])
+    monkeypatch.setattr(computer.psutil, "virtual_memory", lambda: memory)
+    monkeypatch.setattr(computer.psutil, "disk_usage", lambda folder: disk)
+    monkeypatch.setattr(computer.time, "clock_gettime", lambda clock: 90.5)
+    known = ComputerStatus(1_000, 90_500, (0, 100), 61, 812, 3792, 10 * 1024, 30 * 1024)
+    assert computer.computer_status(tmp_path, 1_000) == known
+    zones.clear()
+    assert computer.computer_status(tmp_path, 1_000).temperature_deg_c is None
 
 
 @pytest.mark.parametrize(

@@ -68,8 +68,14 @@ class Motion:
 
     history: MotionHistory = field(init=False, default_factory=MotionHistory)
     strapdown: Strapdown = field(init=False, default_factory=Strapdown)
-    after: MotionEstimator | None = field(init=False, default=None)  # the newest collision
+    followed: list[MotionEstimator] = field(init=False, default_factory=list)
+    """After the collision that is recovered from, and after the newest, where nobody answers that."""
     hides_clipping: bool = field(init=False, default=False)
+
+    @property
+    def after(self) -> MotionEstimator | None:
+        """What is known after the newest collision; None once nothing of it is left."""
+        return self.followed[-1] if self.followed else None
 
     @property
     def is_valid(self) -> bool:

@@ -79,6 +79,7 @@ class ImpactEstimate:
     is_lower_bound: bool = True  # peak and impulse may be larger: something was clipped, or samples are missing
     is_final: bool = False  # the contact is over
     earlier: ImuSample | None = None  # the one before the first that shows it
+    after: MotionEstimator | None = None  # the motion since then, of a collision
 
 
 @dataclass(slots=True)
@@ -95,25 +96,26 @@ class ImpactEstimator(Motion):
 
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
-        after = self.after
         if isinstance(sample, ImuSample):
             f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
             self.strapdown.imu(sample.time_boot_us, f, w)
             self.earlier_imu, self.imu = self.imu, sample
-            if after is not None:
+            for after in self.followed:
                 after.imu(self.strapdown)
-                self.after = None if after.has_faded else after
+            if self.followed and self.followed[0].has_faded:
+                del self.followed[0]
         elif isinstance(sample, (LocalPosition, Odometry)):
             self.strapdown.velocity(sample)
-            if isinstance(sample, LocalPosition) and self.history.add(sample) and after is not None:
-                after.update(sample)
+            if isinstance(sample, LocalPosition) and self.history.add(sample):
+                for after in self.followed:
+                    after.update(sample)
         elif isinstance(sample, GpsFix):
             is_free = self.is_valid and (self.estimate is None or self.estimate.is_final)
             self.doppler.take(sample, self.strapdown, self.history.latest, is_free)
-            if after is not None:
+            for after in self.followed:
                 after.measure(self.doppler)
         elif isinstance(sample, Attitude):
-            most_wrong_rad = 0.0 if after is None else after.tilt_error_rad(sample.time_boot_us)
+            most_wrong_rad = 0.0 if self.after is None else self.after.tilt_error_rad(sample.time_boot_us)
             self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, most_wrong_rad)
 
     def begin(self, impact: Impact) -> ImpactEstimate:
@@ -132,7 +134,7 @@ class ImpactEstimator(Motion):
         if impact.evidence is Evidence.RATE_JUMP:
             # Of the way that the vehicle came.
             normal = Normal().with_direction(force_ned, APPROACH_RAD)
-        self.estimate = estimate = ImpactEstimate(
+        estimate = ImpactEstimate(
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,
             time_error_us=(sample_us - free_until_us) // 2,
@@ -145,10 +147,12 @@ class ImpactEstimator(Motion):
             earlier=self.earlier_imu,
         )
         if impact.is_collision:
-            self.follow_motion(estimate)
+            after = self.motion_after(estimate)
+            estimate, self.followed = replace(estimate, after=after), [*self.followed[:1], after]
+        self.estimate = estimate
         return estimate
 
-    def follow_motion(self, estimate: ImpactEstimate) -> MotionEstimator:
+    def motion_after(self, estimate: ImpactEstimate) -> MotionEstimator:
         """Begin to follow the motion after a collision; before it, too, where an earlier one is still corrected."""
         before, first_us, normal = self.after, estimate.impact.sample_time_boot_us, estimate.normal
         motion, error_m_s = MotionState(estimate.position_ned_m, estimate.velocity_ned_m_s), estimate.velocity_error_m_s
@@ -157,7 +161,7 @@ class ImpactEstimator(Motion):
         place, velocity = motion.position_ned_m, motion.velocity_ned_m_s
         contact = Contact(place, velocity, away_from(normal.direction_ned), normal.error_rad, error_m_s)
         expected, fits_models = contact.rebound(self.recovery.restitution), not self.hides_clipping
-        self.after = after = MotionEstimator(contact, first_us, expected, self.config, before, fits_models)
+        after = MotionEstimator(contact, first_us, expected, self.config, before, fits_models)
         after.note_contact(estimate.is_fully_measured, first_us, normal, estimate.impulse_m_s)
         return after
 
@@ -195,6 +199,6 @@ class ImpactEstimator(Motion):
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)
-        if self.after is not None and self.after.hit_boot_us == estimate.impact.sample_time_boot_us:
+        if estimate.after is not None:
             is_whole, impulse_m_s = estimate.is_fully_measured, estimate.impulse_m_s
-            self.after.note_contact(is_whole, state.last_loud_boot_us, estimate.normal, impulse_m_s)
+            estimate.after.note_contact(is_whole, state.last_loud_boot_us, estimate.normal, impulse_m_s)

@@ -14,13 +14,13 @@ from companion.flight.obstacle_map import FlightRoom
 from companion.flight.states import State
 from companion.messages import Attitude, AttitudeSetpoint, ImuSample, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
-from companion.motion.config import SAME_M_S
+from companion.motion.config import GRAVITY_M_S2, SAME_M_S
 from companion.motion.doppler import Doppler
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import NOTICED_S, EstimateConfig
-from companion.reflex.detection.detector import Impact
+from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.recovery.collision import Collision
 from companion.reflex.surface import Contact, MotionState, Normal, Surface
 
@@ -42,7 +42,7 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         contact = Contact(AT, (north_m_s, 0.0, 0.0), SOUTH, 0.2)
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
-    source, reflex.monitor.estimator.after = reflex.monitor.estimator, estimator
+    source, reflex.monitor.estimator.followed = reflex.monitor.estimator, [estimator]
     how = reflex.law, mission.recovery, mission.companion.settled
     reflex.newest = Collision(0, "fused", 20.0, source, estimator, *how, FlightRoom(flight))
     flight.collisions.append(reflex.newest)
@@ -60,12 +60,24 @@ def hears(
 ):
     sample = LocalPosition(HIT_US + since_us, (north_m, 0.0, down_m), (north_m_s, 0.0, 0.0))
     source = flight.reflex.monitor.estimator
-    source.after.imu(Strapdown(time_boot_us=sample.time_boot_us))
+    source.update(ImuSample(sample.time_boot_us, (0.0, 0.0, -GRAVITY_M_S2), ZERO))
     source.update(sample)
     recover.step(flight, Inputs(positions=[sample]), since_us)
     target = recover.target(flight, since_us)
     assert target is not None
     return target, target.setpoint(0)
+
+
+def test_a_collision_that_nobody_answers_leaves_the_recovery_its_belief_until_both_are_long_past():
+    flight = flight_with()
+    recover, source = recover_in(flight), flight.reflex.monitor.estimator
+    source.begin(Impact(HIT_US + 20_000, HIT_US + 16_000, (0.0, 0.0, -50.0), ImpactKind.CRASH))
+    for since_us in range(40_000, 400_000, 20_000):
+        hears(flight, recover, since_us, 2.0, 0.0)
+    assert flight.collisions[-1].estimator.motion.position_ned_m[0] == pytest.approx(2.0, abs=0.05)
+    for later_us in (13_000_000, 13_004_000):
+        source.update(ImuSample(HIT_US + later_us, (0.0, 0.0, -GRAVITY_M_S2), ZERO))
+    assert source.after is None
 
 
 def test_it_is_flown_by_attitude_until_it_rests_and_then_by_the_place_where_it_does():
