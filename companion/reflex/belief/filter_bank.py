@@ -22,22 +22,23 @@ Floats = npt.NDArray[np.float64]
 # Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping. The last: nothing is missing.
 _SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)])
 _LATE_S, _RAD_S, _DAMPING = np.append(_SOME, _SOME[-1:], axis=0).T
-_SWING, _SLOW, _ONE, _ZERO = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S, np.ones_like(_RAD_S), np.zeros_like(_RAD_S)
+_SWING, _SLOW = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S
 # The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
 # p = delay, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
-# s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
-_K, _H, _M = _SWING + _SLOW, _RAD_S**2 + _SWING * _SLOW, _RAD_S**2 * _SLOW
-_RATES = np.array([[-_K, _ONE, _ZERO], [-_H, _ZERO, _ONE], [-_M, _ZERO, _ZERO]])
-_POLES, _SHAPES = np.linalg.eig(np.moveaxis(_RATES, 2, 0))
-_MODES = _SHAPES * np.linalg.solve(_SHAPES, np.array([_LATE_S, _ONE, _ZERO]).T[..., None]).swapaxes(1, 2)
+# s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c). By Laplace p = s (delay s + 1) / (s^3 + k s^2 + h s + m).
+_K, _H = _SWING + _SLOW, _RAD_S**2 + _SWING * _SLOW
+_TURN_RAD_S = 1j * _RAD_S * np.sqrt(1.0 - _DAMPING**2)
+_POLES = np.array([_TURN_RAD_S - 0.5 * _SWING, -_TURN_RAD_S - 0.5 * _SWING, np.full_like(_SWING, -_SLOW)])
+_WAYS = _POLES * (_LATE_S * _POLES + 1.0) / (3.0 * _POLES**2 + 2.0 * _K * _POLES + _H)
+_MODES = np.array([_WAYS, (_POLES + _K) * _WAYS])
 
-MODELS = len(_POLES)
+MODELS = len(_RAD_S)
 
 
 def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit."""
     x = np.maximum(since_s - _LATE_S, 0.0)
-    way_s, g, _ = np.einsum("wim,wm->iw", _MODES, np.exp(_POLES * x[:, None])).real
+    way_s, g = (_MODES * np.exp(_POLES * x)).sum(axis=1).real
     return g, way_s - np.maximum(_LATE_S - since_s, 0.0), np.exp(-0.5 * _SWING * x)
 
 
