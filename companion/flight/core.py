@@ -51,6 +51,7 @@ class Core(ABC, Generic[FlightT]):
         self.flight, self.reflex = flight, flight.reflex
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = 0
         self._sample_boot_us = 0
+        self._sent: Target | None = None  # as last sent, in the vehicle's view
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
         # What the vehicle is told of it, until it has answered; and whether it is known.
         self._law, self._is_met = CommandClient(), False
@@ -127,7 +128,8 @@ class Core(ABC, Generic[FlightT]):
             note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
-            positions = [each for each in samples if isinstance(each, LocalPosition)] if LocalPosition in kinds else []
+            history = flight.vehicle.history
+            positions = [each for each in samples if isinstance(each, LocalPosition) and each in history]
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
@@ -142,6 +144,9 @@ class Core(ABC, Generic[FlightT]):
 
         One that is still wrong from a hit only puts that right.
         """
+        if self.flight.vehicle.armed is False and self.resets.has_shifted:
+            # It may restart, and count its resets from zero.
+            self.resets = Resets()
         before, is_valid = self.resets.shift_ned_m, self.reflex.monitor.estimator.is_valid
         most_m = self.flight.mission.limits.max_step_m if is_valid else 0.0
         samples = [self.resets.follow(sample, most_m) for sample in samples]
@@ -211,6 +216,7 @@ class Core(ABC, Generic[FlightT]):
         sample_us = self._sample_boot_us = self.reflex.sample_boot_us
         interval_us, holds = round(1e6 / self._setpoint_hz), self.holds
         if not holds:
+            limiter.last = None
             self._change_law(None, now_us)
         due_us = self._setpoint_due_us + interval_us
         self._setpoint_due_us = now_us + interval_us if is_at_once or due_us <= now_us else due_us
@@ -235,7 +241,7 @@ class Core(ABC, Generic[FlightT]):
             setpoint = sent.setpoint(now_us - self.started_at_us)
         flight.outbox.append(self.resets.sent(setpoint))
         if holds:
-            flight.target = target
+            flight.target, self._sent = target, sent
             self._change_law(target.lean is not None, now_us)
 
     def _change_law(self, leans: bool | None, now_us: int, is_new: bool = False) -> None:
@@ -270,7 +276,7 @@ class Core(ABC, Generic[FlightT]):
         By itself it flies by the velocity that it believes. Until that is right it receives a tilt and its thrust, or
         in a recovery by position its place.
         """
-        flight, latest, target = self.flight, self.flight.vehicle.history.latest, self.flight.target
+        flight, latest, target = self.flight, self.flight.vehicle.history.latest, self._sent
         hit, held_s = self.reflex.newest, self.reflex.loss_s
         misled_s, place_m = flight.vehicle.autopilot.misled_s, flight.vehicle.autopilot.last_place_m
         if self._leans is None or latest is None or target is None or hit is None:

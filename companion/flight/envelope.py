@@ -93,7 +93,7 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Setpoint
     if not is_finite(target):
         raise SetpointError(f"a value of the setpoint is not finite: {target}")
     if target.lean is not None:
-        return _with_lean(target, around, fence), ""
+        return _with_lean(target, around, fence, limits), ""
     reasons: list[str] = []
     target = _with_place(target, around, fence, limits, reasons)
     target = _with_velocity(target, limits, reasons)
@@ -188,16 +188,16 @@ def _is_inside(vector: Vector3, sides: Sequence[tuple[Vector3, float]]) -> bool:
     return all(along(vector, normal) >= least - _ROUNDING_M for normal, least in sides)
 
 
-def _with_lean(target: Target, around: Surroundings, fence: Fence) -> Target:
+def _with_lean(target: Target, around: Surroundings, fence: Fence, limits: SetpointLimits) -> Target:
     """The acceleration, held until PX4 notices a silence, stays off surfaces, fence, floor and top."""
     lean, acceleration = target.lean, target.acceleration_ned_m_s2
     assert lean is not None and acceleration is not None, "a lean is one of an acceleration"
-    belief = lean.belief
+    belief, lean = lean.belief, replace(lean, most_tilt_rad=math.radians(limits.max_tilt_deg))
     ends_m_s = plus(belief.velocity_ned_m_s, lean.held_s, plus(acceleration, 1.0, belief.external_m_s2))
     ends = plus(belief.position_ned_m, 0.5 * lean.held_s, plus(belief.velocity_ned_m_s, 1.0, ends_m_s))
     stops = plus(ends, 0.5 * math.hypot(*ends_m_s) / BRAKES_M_S2, ends_m_s)
     surfaces = _ahead(around, fence, belief.position_ned_m, stops)
-    return replace(target, acceleration_ned_m_s2=held_off(acceleration, belief, surfaces, lean.held_s))
+    return replace(target, acceleration_ned_m_s2=held_off(acceleration, belief, surfaces, lean.held_s), lean=lean)
 
 
 def _ahead(around: Surroundings, fence: Fence, start: Vector3, end: Vector3) -> list[Surface]:

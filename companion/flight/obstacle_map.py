@@ -90,6 +90,8 @@ def _touching_ned_m(flight: FlightContext, patch: Patch) -> Vector3:
 def _with_hits(flight: FlightContext, hits: int) -> ObstacleMap:
     mission, touches = flight.mission, []
     for record in flight.collisions[:hits]:
+        if record.source is not flight.reflex.monitor.estimator:
+            continue  # the vehicle has restarted since: its local frame may be another
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
         touch = touch_of(centre, velocity, record.normal, flight.known.reach_m, record.detected_at_us)
         touches += [] if touch is None else [touch]

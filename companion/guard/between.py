@@ -72,6 +72,7 @@ class Between:
     def hear(self, name: str, received: bytes) -> None:
         """Bytes of a client's."""
         client = self._clients[name] = self._clients.get(name) or _Client(Decoder({}, _is_whole))
+        client.is_gone = False
         if self.has_room(name):
             client.waiting += [packet for packet, _ in client.framer.feed(received) if not isinstance(packet, Stray)]
         elif not client.is_flood_told:

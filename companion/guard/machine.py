@@ -18,7 +18,6 @@ from companion.guard.holding import GiveBack, StandDown, TakeOver, lead_into, st
 from companion.guard.states import HOLDING, MAY_CRASH, TABLE, State, Trigger
 from companion.guard.watching import THROTTLE, GuardConnect, StandBy, Watching, goes_down, observe, why_not
 from companion.messages import Asked, LandedState, Sample, Sticks, TimeSync
-from companion.motion.resets import Resets
 from companion.motion.vector import plus
 from companion.reflex.detection.detector import ImpactKind, Situation
 from companion.reflex.recovery.collision import CollisionReport
@@ -112,9 +111,6 @@ class GuardCore(Core[GuardContext]):
         if sticks:
             # Where nobody had a stick in hand before the hit, the first of afterwards.
             guard.sticks = guard.sticks or sticks[0] if self.state in HOLDING else sticks[-1]
-        if guard.vehicle.armed is False and self.resets.has_shifted:
-            # It may restart, and count its resets from zero.
-            self.resets = Resets()
         inputs = inputs._replace(is_enabled=self.is_enabled)
         guard.awaits_choice &= not self.is_enabled
         self.is_enabled, held = False, self.holds
@@ -132,9 +128,9 @@ class GuardCore(Core[GuardContext]):
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 guard.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif Trigger.HIT in TABLE[self.state]:
-                is_first = self.state is State.WATCHING
-                if is_first:
+                if self.state is State.WATCHING:
                     self._remember_mode()
+                is_first = self.state in (State.WATCHING, State.GIVING_BACK)
                 note_before(guard, guard.after_recovery if is_first else None)
                 record_collision(guard, estimate, now_us)
                 self._take(Transition(Trigger.HIT), now_us)
@@ -206,13 +202,16 @@ class GuardCore(Core[GuardContext]):
         if transition.text:
             guard.report(now_us, _KINDS.get(trigger, "guard"), transition.text)
         guard.is_to_hold |= trigger in _TO_HOLD
+        for_sticks, asked = transition.text.startswith(STICKS), guard.command_client.requested_mode
         if self.state not in HOLDING:
+            if for_sticks and asked == guard.vehicle.autopilot.setpoints:
+                guard.count_asked_mode()
             guard.command_client.cancel()
             guard.expected_mode = None
             if guard.collisions:
                 guard.collisions[-1].is_over = True
         if self.state is State.STOOD_DOWN:
-            return StandDown(guard, transition.text.startswith(STICKS), now_us)
+            return StandDown(guard, for_sticks, now_us)
         if self.state is State.ENDED:
             guard.reason = transition.text
         return self.handlers[self.state](guard, now_us)

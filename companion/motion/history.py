@@ -28,6 +28,10 @@ class MotionHistory:
             samples.popleft()
         return True
 
+    def __contains__(self, sample: LocalPosition) -> bool:
+        """Whether this very sample was remembered; one of the same values may have come late."""
+        return any(sample is each for each in reversed(self._samples))
+
     def before(self, time_boot_us: int) -> LocalPosition | None:
         """The latest one before a time."""
         return next((sample for sample in reversed(self._samples) if sample.time_boot_us < time_boot_us), None)

@@ -12,6 +12,7 @@ chances.
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import fmean, median
@@ -19,8 +20,8 @@ from typing import TypeAlias
 
 # Five SERVO_OUTPUT_RAW at the 10 Hz of PX4's onboard set. A turn begins and ends within this time.
 WINDOW_US = 500_000
-# Half a minute of windows after the hit is enough.
-MOST_WINDOWS = 60
+# Half a minute of windows after the hit is enough, and ten minutes of before it.
+MOST_WINDOWS, MOST_BEFORE = 60, 1200
 # The usual level of significance.
 LEAST_CONFIDENCE = 0.99
 # Least relative increase that is reported. A rotor that has lost a twentieth of its blades lifts 0.95^3 of its lift
@@ -61,7 +62,9 @@ class MotorWatch:
 
     earlier_hits: int = 0  # of flights before this one
     damage: Damage | None = None
-    _before: list[list[float]] = field(default_factory=list)  # of each window: see `_shares`
+    _before: deque[list[float]] = field(
+        default_factory=lambda: deque(maxlen=MOST_BEFORE)
+    )  # of each window: see `_shares`
     _after: list[list[float]] = field(default_factory=list)
     _samples_after: list[Outputs] = field(default_factory=list)
     _window: list[Outputs] = field(default_factory=list)

@@ -6,7 +6,7 @@ position after a reset and the position to which its velocity led.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from companion.messages import (
     VELOCITY_M_S,
@@ -31,15 +31,15 @@ class Resets:
     """A reset counts from its second message on, so that one forged or broken message shifts nothing."""
 
     shift_ned_m: Vector3 = ZERO  # offset from this frame to the vehicle's, m
-    _shifts: dict[int, Vector3] = field(default_factory=dict)
-    """Offsets by reset counter: a counter that comes back restores its offset."""
+    _before: tuple[int, Vector3] | None = None
+    """Counter and offset before the newest reset: that counter may come back, and restores its offset."""
     _latest: Odometry | None = None
     _first: Odometry | None = None  # the first message with another counter than the latest's
     _place: LocalPosition | None = None  # the latest one accepted; None after a reset
 
     @property
     def has_shifted(self) -> bool:
-        return bool(self._shifts)
+        return self._before is not None
 
     def follow(self, sample: Sample, most_m: float) -> Sample:
         """The sample in this frame. A jump of more than `most_m` does not shift it."""
@@ -51,7 +51,7 @@ class Resets:
             self._place = sample
         if self.shift_ned_m == ZERO:
             return sample
-        if isinstance(sample, LocalPosition | Odometry | PositionTarget) and sample.position_ned_m is not None:
+        if isinstance(sample, (LocalPosition, Odometry, PositionTarget)) and sample.position_ned_m is not None:
             return replace(sample, position_ned_m=minus(sample.position_ned_m, self.shift_ned_m))
         return sample
 
@@ -73,11 +73,11 @@ class Resets:
         elif first is None or first.reset_counter != sample.reset_counter:
             self._first = sample
         else:
-            self._shifts[latest.reset_counter] = self.shift_ned_m
-            over_s = (first.time_boot_us - latest.time_boot_us) * 1e-6
-            jump = plus(minus(first.position_ned_m, latest.position_ned_m), -over_s, latest.velocity_ned_m_s)
-            shift = self.shift_ned_m if math.hypot(*jump) > most_m else plus(self.shift_ned_m, 1.0, jump)
-            self.shift_ned_m = self._shifts.get(sample.reset_counter, shift)
+            was, self._before = self._before, (latest.reset_counter, self.shift_ned_m)
+            if was is not None and was[0] == sample.reset_counter:
+                self.shift_ned_m = was[1]
+            elif math.hypot(*(jump := _jump_m(latest, first))) <= most_m:
+                self.shift_ned_m = plus(self.shift_ned_m, 1.0, jump)
             self._latest, self._first, self._place = sample, None, None
 
     def sent(self, setpoint: Setpoint) -> Setpoint:
@@ -85,3 +85,12 @@ class Resets:
         if self.shift_ned_m == ZERO or isinstance(setpoint, AttitudeSetpoint):
             return setpoint
         return replace(setpoint, position_ned_m=plus(setpoint.position_ned_m, 1.0, self.shift_ned_m))
+
+
+def _jump_m(before: Odometry, after: Odometry) -> Vector3:
+    """By how much a reset has moved the place; zero after a silence, in which the vehicle itself has moved."""
+    over_us = after.time_boot_us - before.time_boot_us
+    if not 0 <= over_us < CURRENT_US:
+        return ZERO
+    flown_m_s = plus(before.velocity_ned_m_s, 1.0, after.velocity_ned_m_s)
+    return plus(minus(after.position_ned_m, before.position_ned_m), -0.5e-6 * over_us, flown_m_s)

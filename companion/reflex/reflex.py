@@ -140,7 +140,7 @@ class Reflex:
         impact, earlier, source = estimate.impact, self.in_one_recovery(), self.monitor.estimator
         # What holds the vehicle no detector has seen.
         estimator = estimate.after or source.motion_after(estimate)
-        source.followed = [estimator]
+        source.followed, estimator.is_answered = [*source.answered[-1:], estimator], True
         estimator.note_wind(self.sustained_force.hover_wind_m_s2)
         clearance_m = self.law_config.clearance_m
         surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
@@ -156,9 +156,9 @@ class Reflex:
 
     def take_back(self) -> None:
         """Forget the newest collision. What was none hides nothing of the vehicle's velocity."""
-        self.hits.pop()
-        self.newest = next((each for each in self.hits[-1:] if each.source is self.monitor.estimator), None)
-        self.monitor.estimator.followed.clear()
+        source, taken = self.monitor.estimator, self.hits.pop()
+        self.newest = next((each for each in self.hits[-1:] if each.source is source), None)
+        source.followed = [each for each in source.followed if each is not taken.estimator]
 
     def lean(self) -> tuple[Vector3, Lean]:
         """The acceleration wanted by the present recovery, local NED, and what makes attitude and thrust of it.

@@ -49,6 +49,14 @@ def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_wher
     assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
     (echo,) = followed(resets, [PositionTarget((4.0, 0.0, -1.0))])
     assert echo.position_ned_m == pytest.approx((1.0, 0.0, -1.0)), "a setpoint comes back as it was meant"
+    # And a counter that comes back is the frame of then
+    followed(resets, [told(60, 0.06, 0, 1.0), told(80, 0.08, 0, 1.0)])
+    assert resets.shift_ned_m == STILL
+    # After a silence nobody knows how far the vehicle has flown
+    followed(resets, [told(2_080, 4.0, 1, 3.0), told(2_100, 4.1, 1, 3.0)])
+    assert resets.has_shifted and resets.shift_ned_m[0] == pytest.approx(3.0), "the counter of before has its own"
+    followed(resets, [told(4_100, 9.0, 2, 3.0), told(4_120, 9.1, 2, 3.0)])
+    assert resets.shift_ned_m[0] == pytest.approx(3.0)
 
 
 def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_reset():

@@ -518,3 +518,9 @@ def test_a_client_that_floods_takes_no_turn_from_another_and_is_named():
     for now_us in range(3_000_000, 5_000_000, 1_000):
         between.to_vehicle(now_us)
     assert not between.waits and between.has_room("flood")
+    # One that comes back by the same address loses no packet of which the rest comes later
+    between.forget("quiet")
+    between.hear("quiet", quiet[:9])
+    between.to_vehicle(5_000_000)
+    between.hear("quiet", quiet[9:])
+    assert between.to_vehicle(5_000_000) == [quiet]

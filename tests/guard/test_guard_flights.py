@@ -105,8 +105,10 @@ def test_sticks_that_push_on_into_what_was_hit_are_waited_for():
     air.forward = 0.0
     air.run_until(lambda: air.guard.core.flight.command_client.requested_mode is not None, 1.0)
     # A hit just then is recovered from: the change of the mode that follows is the guard's own
-    at_us = air.vehicle.time_boot_us + 2_000
-    air.guard_hears(made("HIGHRES_IMU", {"time_usec": at_us, "fields_updated": 0x3F, "xacc": -40.0, "zacc": -9.8}))
+    at_us = air.vehicle.time_boot_us
+    for time_us in (at_us + 1_000, at_us + 2_000):
+        hit = {"time_usec": time_us, "fields_updated": 0x3F, "xacc": -40.0, "zacc": -9.8}
+        air.guard_hears(made("HIGHRES_IMU", hit))
     air.run_to(State.WATCHING, 10.0)
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
     assert len(air.told("recovered")) == 2 and air.told("let_go") == []
@@ -135,6 +137,21 @@ def test_a_pilot_who_chooses_a_mode_while_the_guard_holds_has_the_vehicle_at_onc
     air.guard.core.is_enabled = True
     air.run_for(0.1)
     assert air.state is State.WATCHING
+
+
+def test_sticks_that_are_moved_before_the_guard_has_seen_its_own_mode_have_the_vehicle_all_the_same():
+    # Given a pilot who pulls back 4 ms after the hit, and a link that brings no report of the mode
+    air = Air(GuardConfig(then="previous"), {"COM_OF_LOSS_T": 1.0})
+    air.flown_by_sticks(0.3)
+    air.run_until(lambda: air.state is State.TAKING_OVER, 20.0)
+    began_s, air.forward = air.time_s, -0.6
+    mute(air, dialect.MAVLINK_MSG_ID_HEARTBEAT, dialect.MAVLINK_MSG_ID_CURRENT_MODE)
+    air.run_for(0.15)
+    # Then the mode that the guard has asked for is not left without a pilot
+    asked = [
+        message.param2 for message in air.sent_by("guard", "COMMAND_LONG", began_s - 0.01) if message.command == 176
+    ]
+    assert asked == [6.0, 3.0] and air.others_last["CURRENT_MODE"].custom_mode == 3 << 16
 
 
 def test_a_mode_that_a_person_chose_just_before_the_vehicle_is_given_back_is_not_overruled():
@@ -206,6 +223,22 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back(lost):
     assert air.run_to(State.WATCHING, 3.0) < 1.0
     air.run_until(lambda: air.mode == "POSCTL", 1.0)
     assert air.kinds().count("unconfirmed") == 1 and air.guard.core.flight.hits == [] and air.told("refused") == []
+    assert air.guard.core.limiter.last is None, "another flies: where the last setpoint was is no place to go to"
+
+
+def test_one_forged_packet_is_no_hit_while_the_vehicle_waits_to_be_given_back():
+    # Given a pilot who pushes on
+    air = Air(GuardConfig(then="previous"))
+    air.flown_by_sticks(0.3)
+    air.run_to(State.GIVING_BACK, 30.0)
+    air.run_for(1.0)
+    (hit,) = air.guard.core.flight.hits
+    when = {"time_usec": air.vehicle.time_boot_us + 2_000, "fields_updated": 0x3F}
+    air.guard_hears(made("HIGHRES_IMU", {**when, "yacc": 40.0, "zacc": -9.8}))
+    assert len(air.guard.core.flight.hits) == 2
+    # Then it is not given back to what hits the same again
+    air.run_for(3.0)
+    assert air.guard.core.flight.hits == [hit] and air.state is State.GIVING_BACK
 
 
 # --- a program on another link

@@ -7,7 +7,7 @@ from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import DISARM, DISARM_BY_FORCE
 from companion.motion.rotation import tilt_rad
-from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
+from companion.reflex.config import LIES_US, LOW_M, LOW_US, TIPPED_US
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition | None:
@@ -19,7 +19,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
     has_unsettled = bool(hits) and hits[-1].settled_after_s is None
     if watch.tipped.lasts_us >= TIPPED_US:
         how = "tipped over"
-    elif has_unsettled and not goes_down and watch.low.lasts_us >= LOW_US:
+    elif has_unsettled and not goes_down and _is_to_be_higher(flight) and watch.low.lasts_us >= LOW_US:
         how = "on the floor after a hit"
     elif has_unsettled and _is_pressed(flight, now_us):
         how = "pressed to what was hit"
@@ -38,6 +38,11 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
         now_us, "crashed", text, how=how, tilt_deg=tilt_deg, position_ned_m=place, speed_m_s=speed_m_s, motor=motor
     )
     return Transition(Trigger.CRASHED)
+
+
+def _is_to_be_higher(flight: FlightContext) -> bool:
+    """Whether the setpoint, or as far as is known another's, is above what counts as on the floor."""
+    return flight.target is None or -flight.mission_ned_m(flight.target.position_ned_m)[2] > LOW_M
 
 
 def _is_pressed(flight: FlightContext, now_us: int) -> bool:

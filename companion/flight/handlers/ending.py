@@ -22,7 +22,7 @@ DISARM_NEWS_US = 1_500_000
 
 def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Transition | None:
     """The first reason to end, the pilot's before all others."""
-    lost = _control_lost(flight, state, now_us)
+    lost = _control_lost(flight, state)
     if lost is not None:
         return lost
     if inputs.refusal is not None:
@@ -36,32 +36,42 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     reason = silent_position(flight)
     # The mission's own conditions are looked at with each new position, so that a silent link is not one of them.
     if reason is None and inputs.positions and flight.armed_at_us is not None:
-        reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+        reason = _outside_fence(flight)
+        if reason is None:
+            abort = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+            reason = _once_clear(flight, state, abort, now_us)
     return None if reason is None else Transition(Trigger.INTERRUPTED, reason)
 
 
 def _stop_reason(flight: FlightContext, state: State, asked: str | None, now_us: int) -> str | None:
-    """Why to stop now. A hold at what was hit may touch it again: the recovery comes first, unless asked for twice."""
-    put_off = flight.stop_put_off
-    if state is not State.RECOVERING or (asked is not None and put_off is not None):
-        return asked or put_off
-    if asked is not None:
-        flight.stop_put_off = asked
-        flight.report(now_us, "stopping", "the vehicle is handed over once it is clear; asked once more, at once")
+    """Why to stop now; asked for twice, in a recovery, too."""
+    if asked is not None and flight.stop_put_off is not None:
+        return asked
+    return _once_clear(flight, state, asked or flight.stop_put_off, now_us)
+
+
+def _once_clear(flight: FlightContext, state: State, reason: str | None, now_us: int) -> str | None:
+    """The reason to end. A hold at what was hit may touch it again: the recovery comes first."""
+    if reason is None or state is not State.RECOVERING:
+        return reason
+    if flight.stop_put_off is None:
+        flight.stop_put_off = reason
+        text = f"{reason}: the vehicle is handed over once it is clear; asked once more, at once"
+        flight.report(now_us, "stopping", text)
     return None
 
 
-def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transition | None:
+def _control_lost(flight: FlightContext, state: State) -> Transition | None:
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
         return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion", is_left=True)
     taken = taken_by(flight, flight.command_client.requested_mode, "the pilot")
-    if taken is None or (state is State.LANDING and _may_be_down(flight, now_us)):
+    if taken is None or (state is State.LANDING and _may_be_down(flight)):
         return None
     return Transition(Trigger.CONTROL_LOST, f"{taken}; setpoints stopped", is_left=True)
 
 
-def _may_be_down(flight: FlightContext, now_us: int) -> bool:
+def _may_be_down(flight: FlightContext) -> bool:
     """PX4 leaves the land mode by itself when it has landed and disarms; the heartbeat that reports it may come later.
 
     Nothing is sent meanwhile: the setpoints ended when the land mode was confirmed.
@@ -72,8 +82,8 @@ def _may_be_down(flight: FlightContext, now_us: int) -> bool:
     if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
         return True
     if flight.foreign_mode_since_us is None:
-        flight.foreign_mode_since_us = now_us
-    return now_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
+        flight.foreign_mode_since_us = flight.trajectory_us
+    return flight.trajectory_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
 
 
 def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition | None:
@@ -109,15 +119,21 @@ def silent_position(flight: FlightContext) -> str | None:
     return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
 
 
+def _outside_fence(flight: FlightContext) -> str | None:
+    """Two positions in a row have to say so: one forged or broken packet ends no flight."""
+    most_m, earlier = (
+        flight.mission.abort_when.outside_fence_by_m,
+        flight.vehicle.history.before(flight.latest.time_boot_us),
+    )
+    if most_m is None or earlier is None:
+        return None
+    places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (flight.latest, earlier)]
+    outside_m = min(map(flight.mission.fence.outside_by_m, places))
+    return f"the vehicle is {outside_m:.2f} m outside the fence" if outside_m > most_m else None
+
+
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when, earlier = flight.mission.abort_when, flight.vehicle.history.before(flight.latest.time_boot_us)
-    # Two positions in a row have to say so: one forged or broken packet ends no flight.
-    if when.outside_fence_by_m is not None and earlier is not None:
-        fence = flight.mission.fence
-        places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (flight.latest, earlier)]
-        outside_m = min(map(fence.outside_by_m, places))
-        if outside_m > when.outside_fence_by_m:
-            return f"the vehicle is {outside_m:.2f} m outside the fence"
+    when = flight.mission.abort_when
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
         return f"flight time above {when.flight_time_above_s:g} s"
@@ -166,8 +182,9 @@ def taken_by(flight: FlightContext, requested_mode: int | None, others: str) -> 
     if holder is None or report is None:
         flight.foreign_mode_since_us = None
         return None
-    offboard = flight.vehicle.autopilot.setpoints
-    is_late = offboard in (flight.expected_mode, requested_mode) and report.intended_custom_mode in (None, offboard)
+    autopilot = flight.vehicle.autopilot
+    is_late = autopilot.wants_setpoints_first and autopilot.setpoints in (flight.expected_mode, requested_mode)
+    is_late &= report.intended_custom_mode in (None, autopilot.setpoints)
     is_low = flight.height_m is not None and flight.height_m < flight.mission.companion.min_detection_height_m
     if holder == "failsafe" and is_late and not is_low:
         if flight.foreign_mode_since_us is None:

@@ -59,6 +59,7 @@ class MotionEstimator:
     motion: MotionState = field(init=False)
     normal: Normal = field(init=False)  # by the contact's force
     pushed_boot_us: int = field(init=False)  # the contact's last sample
+    is_answered: bool = False  # by a recovery
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # what is wrong of the vehicle's own estimate is known
     known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
@@ -236,7 +237,7 @@ class MotionEstimator:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
         is_right = self.is_valid or (not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
-        return 0.0 if is_right else numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s)
+        return 0.0 if is_right else min(numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s), reflex.TIPPED_RAD)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
@@ -263,11 +264,6 @@ class MotionEstimator:
         if not self.has_converged:
             return math.inf
         return SAME_M_S + math.hypot(*self.velocity_error_m_s) + reflex.SURE * self._swings_m_s
-
-    @property
-    def is_reported(self) -> bool:
-        """Whether what the vehicle reports is its motion: the hit was measured whole, or is corrected."""
-        return self.is_fully_measured or (self.has_converged and not self.is_measured_apart)
 
     def _believe(self, motion: MotionState, spread_m_s: float) -> None:
         """The motion by the reports; the horizontal velocity by a receiver, where there is one."""

@@ -69,13 +69,18 @@ class Motion:
     history: MotionHistory = field(init=False, default_factory=MotionHistory)
     strapdown: Strapdown = field(init=False, default_factory=Strapdown)
     followed: list[MotionEstimator] = field(init=False, default_factory=list)
-    """After the collision that is recovered from, and after the newest, where nobody answers that."""
+    """After the collision that is recovered from and the one before, and after the newest, if nobody answers that."""
     hides_clipping: bool = field(init=False, default=False)
 
     @property
     def after(self) -> MotionEstimator | None:
         """What is known after the newest collision; None once nothing of it is left."""
         return self.followed[-1] if self.followed else None
+
+    @property
+    def answered(self) -> list[MotionEstimator]:
+        """Those of collisions with a recovery: if the newest was none, the one before counts."""
+        return [each for each in self.followed if each.is_answered][-2:]
 
     @property
     def is_valid(self) -> bool:

@@ -148,7 +148,7 @@ class ImpactEstimator(Motion):
         )
         if impact.is_collision:
             after = self.motion_after(estimate)
-            estimate, self.followed = replace(estimate, after=after), [*self.followed[:1], after]
+            estimate, self.followed = replace(estimate, after=after), [*self.answered, after]
         self.estimate = estimate
         return estimate
 

@@ -119,7 +119,7 @@ def advance(
                 continue
             monitor.imu_fault = None
             imu_samples += 1
-            if 0 <= estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
+            if monitor.gate.is_late(sample.time_boot_us, estimator.strapdown.time_boot_us):
                 continue
         elif type(sample) is Attitude and not monitor.gate.attitude(sample):
             continue

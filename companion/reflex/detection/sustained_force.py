@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import shapely
 
 from companion.messages import AttitudeTarget, LocalPosition, Vector3
-from companion.motion.config import GATE, GRAVITY_M_S2
+from companion.motion.config import GATE, GRAVITY_M_S2, KEPT_US
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards, unit
@@ -63,6 +63,8 @@ class SustainedForceMonitor:
         """Take the setpoint of the vehicle's attitude control; those that it may still follow are kept."""
         self.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         kept, time_us = self.setpoints, sample.time_boot_us
+        if kept and time_us <= kept[-1][0] - KEPT_US:
+            kept.clear()
         if sample.attitude_wxyz is not None and not (kept and time_us <= kept[-1][0]):
             kept.append((time_us, body_to_ned(sample.attitude_wxyz, _UP_FRD)))
             while len(kept) > 1 and kept[1][0] < time_us - reflex.FOLLOWS_US:

@@ -32,6 +32,7 @@ class Lean:
     surfaces: Sequence[Surface]
     full_m_s2: float  # specific force at full thrust
     held_s: float  # for so long PX4 flies it on, if nothing follows
+    most_tilt_rad: float = reflex.MOST_TILT_RAD  # as who flies limits it
 
     def tilted_by(self, acceleration_ned_m_s2: Vector3) -> "Lean":
         """Of a vehicle that has the tilt of this acceleration already: its thrust is that tilt's."""
@@ -101,7 +102,8 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     d = min(max(acceleration_ned_m_s2[2], -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
     margin = reflex.TURN_MARGIN if turns_rad_s > reflex.BRAKED_RAD_S else reflex.HOVER_MARGIN
-    least_cosine = min(max(math.cos(reflex.MOST_TILT_RAD), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
+    most_tilt_rad = min(lean.most_tilt_rad, reflex.MOST_TILT_RAD)
+    least_cosine = min(max(math.cos(most_tilt_rad), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
     # One that turns by more than a radian within its attitude's lag does not get the tilt that is asked for.
     most_m_s2 /= max(1.0, turns_rad_s * reflex.LEAD_S)

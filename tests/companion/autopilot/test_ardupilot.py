@@ -96,6 +96,16 @@ def test_force_flying_is_high_only_while_it_is_flown_by_attitude():
     assert [high for high, _ in itertools.groupby(forced)] == [(159, 0), (159, 2), (159, 0)]
 
 
+def test_a_pilot_of_a_copter_that_is_critical_has_it_at_once():
+    f = flight(FakeCopter(), items=[TAKEOFF, INTO_WALL, LANDING])
+    f.run_to("mission")
+    f.vehicle.failsafe = True
+    f.run_for(1.5)
+    f.vehicle.mode, chosen_us = 2, f.now_us  # ALT_HOLD
+    f.run_to("aborted", 0.4)
+    assert f.setpoints_since(chosen_us + 250_000) == []
+
+
 def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit():
     f = leaning(FakeCopter(wall_north_m=3.0))
     *leans, (place_s, place) = f.companion.last_words()
@@ -120,12 +130,24 @@ def test_the_last_words_of_a_companion_are_a_lean_and_a_place_off_what_was_hit()
     # lift it by 2 m/s^2
     flown = f.companion.core.flight.target
     leans = replace(flown.lean, belief=replace(flown.lean.belief, attitude_wxyz=(0.954, 0.0, 0.301, 0.0)))
-    f.companion.core.flight.target = replace(flown, lean=leans)
+    f.companion.core._sent = replace(flown, lean=leans)
     (_, lean), *_ = f.companion.last_words()
     assert mav.MAVLink(None).decode(bytearray(lean)).thrust == pytest.approx(9.81 / 20.0, abs=0.01)
     # And none is left where the next setpoint is a place: the hit was taken back while the mode is not known
-    f.companion.core.flight.target = flown.at_rest()
+    f.companion.core._sent = flown.at_rest()
     assert f.companion.last_words() == []
+
+
+def test_the_place_of_the_last_words_is_the_one_that_was_sent():
+    # Given a PX4 whose own place a hit has left wrong by a metre
+    f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
+    core, hit = f.companion.core, f.companion.core.reflex.newest
+    hit.estimator.has_converged, hit.estimator.position_error_m, hit.leans = True, (0.0, 1.0, 0.0), False
+    core._stream_setpoint(True, f.now_us)
+    (_, word), *_ = f.companion.last_words()
+    (sent,) = [each for each in core.flight.outbox if isinstance(each, PositionSetpoint)]
+    word = mav.MAVLink(None).decode(bytearray(word))
+    assert word.y == pytest.approx(sent.position_ned_m[1]) and word.y > core.flight.target.position_ned_m[1] + 0.9
 
 
 def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_is_right():
@@ -133,7 +155,7 @@ def test_to_a_px4_the_last_words_are_a_lean_that_brakes_until_its_own_velocity_i
     f = leaning(FakeVehicle(wall_north_m=3.0, loss_s=0.3))
     flown = f.companion.core.flight.target
     moves = replace(flown.lean.belief, velocity_ned_m_s=(-4.0, 0.0, 0.0), spread_m_s=0.1, level_m_s2=(0.0, 0.0, 0.0))
-    f.companion.core.flight.target = replace(flown, lean=replace(flown.lean, belief=moves))
+    f.companion.core._sent = replace(flown, lean=replace(flown.lean, belief=moves))
     leans = f.companion.last_words()
     # Then it is held until 1.4 s after the hit, the last 0.43 s of it by PX4 itself. It ends what is certain of the
     # speed, but for 1.5 m/s^2 by which the tilt may be wrong

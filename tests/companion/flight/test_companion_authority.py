@@ -4,6 +4,7 @@ import pytest
 
 from bench.fly.packets import made
 from bench.fly.virtual_time import INTERVAL_US
+from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
 from tests.flying import Flight
 
@@ -104,6 +105,20 @@ def test_ctrl_c_at_a_wall_waits_until_the_vehicle_is_clear_and_once_more_does_no
     insisting.run_to_end(2.0)
     assert insisting.vehicle.mode == LOITER and "recovered" not in insisting.kinds()
     assert insisting.report.reason == "Ctrl-C, and once more"
+
+
+def test_a_mission_that_is_to_end_at_a_wall_ends_once_the_vehicle_is_clear_but_outside_the_fence_at_once():
+    aborts = {"outside_fence_by_m": 0.5, "battery_below_percent": 50.0}
+    vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
+    f = flight(vehicle, items=[fake_vehicle.TAKEOFF, fake_vehicle.INTO_WALL, {"land": {}}], abort_when=aborts)
+    f.run_to("recovering")
+    outside = f.copy()
+    f.vehicle.battery_percent = 40
+    f.run_to_end(8.0)
+    assert "recovered" in f.kinds() and f.report.reason.startswith("battery at 40 %")
+    outside.vehicle.position[1] += 30.0
+    outside.run_to_end(2.0)
+    assert "recovered" not in outside.kinds() and "outside the fence" in outside.report.reason
 
 
 def test_a_vehicle_that_refuses_to_hold_is_asked_to_land():

@@ -13,7 +13,7 @@ from companion.motion.motors import Damage, MotorWatch
 from companion.motion.vector import plus
 from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 from companion.reflex.detection.crash import CrashWatch
-from tests.companion.fake_vehicle import flying_in, mission
+from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, FakeVehicle, flight, flying_in, mission
 from tests.flying import Flight
 from tests.simulated import flown, wall
 
@@ -71,6 +71,15 @@ def test_on_the_floor_after_a_hit_it_has_crashed_also_where_it_stands_upright():
     lies(f, roll_deg=0.0)
     assert f.run_to("crashed", 3.0) == pytest.approx(1e-6 * LOW_US, abs=0.1)
     assert f.told("crashed")[0].startswith("crashed: on the floor after a hit")
+
+
+def test_a_low_hover_after_a_hit_that_did_not_settle_is_no_crash():
+    low = {"go_to": {"position_ned_m": [0, 0, -0.25], "speed_m_s": 1.0}}
+    items, slow = [TAKEOFF, INTO_WALL, low, {"hold": {"duration_s": 3}}, LANDING], {"speed_m_s": 1e-6, "timeout_s": 2.0}
+    f = flight(
+        FakeVehicle(wall_north_m=3.0), companion={"settled": slow}, items=items, on_collision={"then": "continue"}
+    )
+    assert f.run_to_end().outcome == "completed" and "not settled" in f.event("recovered").text
 
 
 def test_what_is_still_pressed_to_a_wall_when_the_time_for_the_recovery_is_over_has_crashed():
@@ -179,6 +188,12 @@ class Flown:
             damage = self.monitor.take(tuple(outputs), was_hit, self.now_us)
             told += [] if damage is None else [damage]
         return told
+
+
+def test_of_hours_without_a_hit_ten_minutes_are_kept():
+    flown = Flown()
+    flown.fly(750.0, False)
+    assert len(flown.monitor._before) == 1200
 
 
 def test_a_motor_that_lifts_less_is_named_with_how_much_harder_it_works_and_how_surely():

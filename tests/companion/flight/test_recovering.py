@@ -4,13 +4,14 @@ import math
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import development as mav
 
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.core import Limiter
 from companion.flight.envelope import SetpointError
 from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
-from companion.flight.obstacle_map import FlightRoom
+from companion.flight.obstacle_map import FlightRoom, all_known
 from companion.flight.states import State
 from companion.messages import Attitude, AttitudeSetpoint, ImuSample, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
@@ -23,6 +24,7 @@ from companion.reflex.config import NOTICED_S, EstimateConfig
 from companion.reflex.detection.detector import Impact, ImpactKind
 from companion.reflex.recovery.collision import Collision
 from companion.reflex.surface import Contact, MotionState, Normal, Surface
+from tests.companion.fake_vehicle import flying_in
 
 HIT_US, SOUTH = 1_000_000, (-1.0, 0.0, 0.0)
 AT = (3.0, 0.0, -2.0)
@@ -43,6 +45,7 @@ def flight_with(loss_s=0.3, learnt_s=2.0, estimator=None, law="adaptive", north_
         estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig())
         estimator.note_contact(True, HIT_US, estimator.normal, 0.0)
     source, reflex.monitor.estimator.followed = reflex.monitor.estimator, [estimator]
+    estimator.is_answered = True
     how = reflex.law, mission.recovery, mission.companion.settled
     reflex.newest = Collision(0, "fused", 20.0, source, estimator, *how, FlightRoom(flight))
     flight.collisions.append(reflex.newest)
@@ -315,6 +318,22 @@ def test_what_a_receiver_shows_to_be_wrong_is_followed_after_the_recovery():
     assert record.estimator.position_error_m[0] == pytest.approx(20.0)
 
 
+def test_a_position_that_is_heard_again_moves_no_surface():
+    # Given a recovery in which the position of just after the hit comes by another way again and again
+    goals = []
+    for is_repeated in (False, True):
+        f = flying_in("recovering")
+        hit = f.companion.core.flight.collisions[-1]
+        stamp_ms, (north, _, down) = hit.estimator.hit_boot_us // 1000 + 20, hit.contact.position_ned_m
+        while f.state == "recovering":
+            f.run_for(0.1)
+            if is_repeated:
+                f.vehicle.send(mav.MAVLink_local_position_ned_message(stamp_ms, north, 0.0, down, -0.5, 0.0, 0.0))
+        goals.append(hit.setpoint_ned_m)
+    # Then the goal is as without it
+    assert goals[0] == pytest.approx(goals[1], abs=0.01)
+
+
 @pytest.mark.parametrize("is_apart", [False, True])
 def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apart):
     flight = flight_with(estimator=measured_apart() if is_apart else None)
@@ -322,9 +341,9 @@ def test_what_is_left_wrong_of_a_hit_fades_but_while_a_receiver_shows_it(is_apar
     wrong = flight.reflex.left_wrong(HIT_US + 13_000_000)
     assert wrong.share == 1.0 if is_apart else wrong is None
     # Nor does anything of it hold of a vehicle that has restarted, whose clock begins anew
-    assert flight.reflex.left_wrong(1).share == 1.0
+    assert flight.reflex.left_wrong(1).share == 1.0 and len(all_known(flight).patches) == 1
     flight.reflex.restart(0)
-    assert flight.reflex.newest is None and flight.reflex.in_one_recovery() == []
+    assert flight.reflex.newest is None and flight.reflex.in_one_recovery() == [] and all_known(flight).patches == ()
     # Nor when a hit after it is taken back
     flight.collisions.append(flight_with().collisions[0])
     flight.reflex.take_back()

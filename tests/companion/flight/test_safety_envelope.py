@@ -26,6 +26,7 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
 from companion.motion.config import GRAVITY_M_S2
+from companion.motion.rotation import tilt_rad
 from companion.reflex.belief.motion_estimator import Belief
 from companion.reflex.config import HELD_S, MOST_HELD_S, NOTICED_S
 from companion.reflex.recovery.attitude_law import Lean
@@ -98,6 +99,13 @@ def test_what_is_not_finite_is_a_fault_and_nothing_else(broken):
     for wrong in (replace(good, yaw_rad=broken), replace(good, lean=leans)):
         with pytest.raises(SetpointError):
             bounded(wrong, around(), FENCE, LIMITS)
+
+
+def test_no_attitude_leans_further_than_the_limit():
+    lean = Lean(Belief((0.0, 0.0, -1.5), (0.0, 0.0, 0.0)), (), 16.0, 0.4)
+    leans = replace(asked((0.0, 0.0, -1.5), None, (5.0, 0.0, 0.0)), lean=lean)
+    sent, _ = bounded(leans, around(), FENCE, SetpointLimits(max_tilt_deg=10.0))
+    assert tilt_rad(sent.setpoint(0).attitude_wxyz) == pytest.approx(math.radians(10.0))
 
 
 @given(POINT, POINT, st.one_of(st.none(), POINT))

@@ -197,7 +197,7 @@ def test_the_belief_goes_by_the_receiver_until_the_vehicles_estimate_agrees_for_
     go_on(air, found, 0.7)
     # Then it counts again, and what the accelerometer has shown before does not once more
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.25)
-    assert found.is_reported and abs(found.velocity_error_m_s[0]) < SAME_M_S
+    assert not found.is_measured_apart and abs(found.velocity_error_m_s[0]) < SAME_M_S
 
 
 def test_reports_that_look_as_expected_do_not_keep_the_belief_from_the_receivers_first_velocity():
@@ -216,7 +216,7 @@ def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estima
     go_on(air, found, 2.0, unseen_m_s2=0.4)
     air.reported_off_m_s = 0.0
     go_on(air, found, 2.0, unseen_m_s2=0.4)
-    assert found.is_reported and found.tilted_m_s2[0] == pytest.approx(0.4, abs=0.1)
+    assert not found.is_measured_apart and found.tilted_m_s2[0] == pytest.approx(0.4, abs=0.1)
     # When it is right at last, then that is known, too, although the reported velocity counts by now
     go_on(air, found, 4.0)
     assert found.tilted_m_s2[0] == pytest.approx(0.0, abs=0.1)
@@ -277,7 +277,7 @@ def test_the_place_is_the_receivers_as_far_as_that_is_good_until_the_vehicles_es
         go_on(air, found, 0.02)
         # Then the belief stays where it was, all along
         assert found.motion.position_ned_m[0] == pytest.approx(before_m, abs=0.1 + within_m)
-    assert found.is_reported
+    assert not found.is_measured_apart
 
 
 def test_an_acceleration_that_the_accelerometer_does_not_show_is_found():

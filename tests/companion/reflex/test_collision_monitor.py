@@ -22,7 +22,8 @@ from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
-from companion.reflex.detection.detector import ImpactKind, Phase, Situation
+from companion.reflex.detection.detector import Impact, ImpactKind, Phase, Situation
+from companion.reflex.detection.health import SampleGate
 from companion.reflex.detection.monitor import advance, start_monitor
 from companion.reflex.reflex import Reflex
 
@@ -300,6 +301,17 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
     assert strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
 
 
+def test_an_imu_sample_that_is_stamped_ahead_hides_what_comes_after_it_for_a_tenth_of_a_second_at_most():
+    gate, newest_us, taken_us = SampleGate(), 3_900_000, []
+    # Given one that is ahead by 1.9 s, amid some that are late by an interval
+    for us in range(2_000_000, 2_200_000, INTERVAL_US):
+        if not gate.is_late(us, newest_us):
+            newest_us = us
+            taken_us.append(us)
+            assert gate.is_late(us - INTERVAL_US, newest_us)
+    assert taken_us[0] == 2_100_000 and len(taken_us) == 100_000 // INTERVAL_US
+
+
 @pytest.mark.parametrize("force_m_s2", [0.0, 40.0])
 def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_order_they_come(force_m_s2):
     # Given a vehicle that flies north, whose estimator takes a jump back, as of a hit that clipping hides whole
@@ -325,7 +337,11 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     assert len(reflex.hits) == 1
     assert reflex.hits[0].estimator.start.velocity_ned_m_s[0] == pytest.approx(-0.2 * 2.0, abs=0.05)
     assert bool(rejected) is (force_m_s2 == 0.0)
-    # And one that is taken back leaves nothing
-    assert not reflex.monitor.estimator.is_valid
+    # And a second one that is taken back leaves what is known of the first, of which nothing is left at last
+    source, first = reflex.monitor.estimator, reflex.hits[0]
+    first.is_over = True
+    reflex.begin(source.begin(Impact(us, us - INTERVAL_US, (-40.0, 0.0, 0.0), ImpactKind.WALL)), room, us)
     reflex.take_back()
-    assert reflex.hits == [] and reflex.monitor.estimator.is_valid
+    assert reflex.newest is first and source.followed == [first.estimator] and not source.is_valid
+    reflex.take_back()
+    assert reflex.hits == [] and source.is_valid

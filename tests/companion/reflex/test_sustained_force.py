@@ -249,3 +249,10 @@ def test_a_recovery_begins_with_the_wind_of_the_hover_before_it():
     # And what it feels at rest in the recovery, a wall perhaps, is no wind of the next hit
     flight.run_for(1.4)
     assert flight.state == "recovering" and reflex.sustained_force.hover_wind_m_s2 == known
+
+
+def test_an_attitude_setpoint_that_is_stamped_ahead_is_forgotten_with_the_next_one():
+    monitor = SustainedForceMonitor()
+    for time_us in (1_000_000, 9_000_000, 1_100_000, 1_080_000):
+        monitor.set_attitude(AttitudeTarget(time_us, 0.5, (1.0, 0.0, 0.0, 0.0)))
+    assert [time_us for time_us, _ in monitor.setpoints] == [1_100_000]
