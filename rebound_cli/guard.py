@@ -1,7 +1,9 @@
 """`rebound guard` on a real connection and the real clock: until Ctrl-C, SIGTERM, or nothing to guard."""
 
+import shutil
 from argparse import Namespace
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from companion.guard.guard import Guard
 from companion.shell.clock import Clock
 from companion.shell.connections.addresses import Opened
 from companion.shell.connections.clients import SharedConnection, carried_bytes_s
-from companion.shell.connections.connection import Connection
+from companion.shell.connections.connection import Connection, plain
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
 from rebound_cli.flights.kept import folder_with_room, hits_text
@@ -21,7 +23,7 @@ from rebound_cli.inputs.documents import Document, apply_overrides, load_documen
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import Loop, watched
-from rebound_cli.live.signed_connection import open_signed, refused_packets
+from rebound_cli.live.signed_connection import open_signed, refused_packets, unheard_text
 from rebound_cli.live.status import served
 from rebound_cli.report.showing import offer_page
 from rebound_cli.results import run_folder
@@ -45,7 +47,8 @@ def run_guard(options: Namespace) -> None:
             while not (outcome := _recorded(config, options.out, connection, console, interrupts, manager, between)):
                 pass
         if interrupts.reason is None:
-            raise ReboundError(outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else "."))
+            text = outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else ".")
+            raise ReboundError(text + unheard_text(connection))
 
 
 def _recorded(
@@ -59,8 +62,10 @@ def _recorded(
 ) -> str:
     """One folder: until the end, which is returned, or, then empty, until it is long and the vehicle disarmed."""
     folder, ring = folder_with_room(out, "guard", config.companion.disk)
-    run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
-    run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
+    settings = config.model_dump(mode="json", exclude_none=True)
+    with _told(console, folder):
+        run_folder.write_yaml(folder / run_folder.GUARD_NAME, settings)
+        run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
     guard, kept_out = Guard(config), 0 if between is None else between.kept_out
     try:
@@ -95,12 +100,25 @@ def _recorded(
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }
-        run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
+        with _told(console, folder):
+            run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
+    if outcome and flight.vehicle.identity is None:
+        shutil.rmtree(folder)  # no vehicle was met: it is no flight
+        return outcome
     left_alone = f", {flight.left_alone} left to the program that flies" if flight.left_alone else ""
     console.print(f"{summary['outcome']}; {hits_text(len(hits))}{left_alone}; log in {folder}")
     if outcome:
         offer_page(folder, console)
     return outcome
+
+
+@contextmanager
+def _told(console: Console, folder: Path) -> Iterator[None]:
+    """What cannot be written, as on a full disk, is told, and keeps no vehicle from being guarded."""
+    try:
+        yield
+    except OSError as error:
+        console.print(f"{folder}: not all can be written: {plain(error)}")
 
 
 def guard_config(options: Namespace) -> GuardConfig:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from sim_vehicle.airframes.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
@@ -317,6 +317,9 @@ class Airframe(Part):
         # A flat body has as much about one axis as about the two others; files give three digits.
         if 2.0 * max(x, y, z) > 1.01 * (x + y + z):
             raise ValueError("inertia_kg_m2: one is more than the two others together, which no body has")
+        most_kg_m2 = self.mass_kg * self.geometry.reach_m**2
+        if max(x, y, z) > most_kg_m2:
+            raise ValueError(f"inertia_kg_m2: all mass at the rim would have {most_kg_m2:.3g}; are these g m^2?")
         tip_kg, radius_m = self.arms.tip_mass_kg, self.geometry.motor_radius_m
         squares_m2 = [math.hypot(*rotor.place_frd_m) ** 2 for rotor in self.rotors] or 4 * [radius_m**2]
         if tip_kg * len(squares_m2) >= self.mass_kg or tip_kg * sum(squares_m2) >= z:
@@ -365,7 +368,7 @@ class Airframe(Part):
             )
         if self.hover_fraction < LEAST_HOVER:
             raise ValueError(
-                f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust, and PX4 asks for no "
+                f"hovering would take {100 * self.hover_fraction:.1f} % of the greatest thrust, and PX4 asks for no "
                 f"less than {100 * THRUST_MIN:.0f} %: the vehicle could not sink; "
                 f"lower motors.max_thrust_n so that it takes at least {100 * LEAST_HOVER:.0f} %"
             )
@@ -412,8 +415,18 @@ def load_built_in(name: str) -> Airframe:
         raise AirframeError(
             f"no airframe is called '{name}': {meant} {', '.join(built_in_airframes())} or a file's path"
         )
-    data = yaml.safe_load((BUILT_IN_FOLDER / f"{name}.yaml").read_text())
-    return Airframe.model_validate(with_base(data))
+    return load_airframe_file(BUILT_IN_FOLDER / f"{name}.yaml")
+
+
+def load_airframe_file(path: Path) -> Airframe:
+    """Raises AirframeError for what is no airframe's file."""
+    try:
+        return Airframe.model_validate(with_base(yaml.safe_load(path.read_text())))
+    except ValidationError as problem:
+        first = problem.errors()[0]
+        raise AirframeError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from problem
+    except (OSError, TypeError, ValueError, yaml.YAMLError) as problem:
+        raise AirframeError(f"{path} cannot be read as an airframe: {problem}") from problem
 
 
 def with_base(data: Mapping[str, Any]) -> dict[str, Any]:

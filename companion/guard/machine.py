@@ -29,7 +29,6 @@ _KINDS = {
     Trigger.POSITION_SILENT: "link",
     Trigger.LEADS_BACK: "take_over",
     Trigger.WORTH_GUARDING: "watching",
-    Trigger.NOT_TO_GUARD: "watching",
     Trigger.ENABLED: "enabled",
     Trigger.STREAMS_GONE: "link",
     Trigger.STOPPED: "stopped",

@@ -155,4 +155,4 @@ class Watching(Handler[GuardContext]):
         streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
         guard.program_elsewhere |= streams and not guard.keeps_others_out
         reason = why_not(guard)
-        return None if reason is None else Transition(Trigger.NOT_TO_GUARD, reason)
+        return None if reason is None else Transition(Trigger.NOT_TO_GUARD)

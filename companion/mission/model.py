@@ -150,7 +150,7 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
     """The mission when nothing is hit, round what is known beforehand, or without that as it is written."""
     place: Vector3 = (0.0, 0.0, 0.0)
     known = replace(mission.known, patches=(), keeps_in=False) if is_as_written else mission.known
-    speeds = mission.speeds
+    speeds, until_now_s = mission.speeds, 0.0
     for step in items.program(mission.items):
         action, planned = step.action, Planned(stay(place))
         lasts_s: float | None = 0.0
@@ -160,7 +160,8 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
             case items.HoldItem():
                 lasts_s = action.duration_s
             case items.WaitForItem():
-                known_s = [until_s for until_s in (action.flight_time_s, step.item.timeout_s) if until_s is not None]
+                flight_s = None if action.flight_time_s is None else max(0.0, action.flight_time_s - until_now_s)
+                known_s = [until_s for until_s in (flight_s, step.item.timeout_s) if until_s is not None]
                 lasts_s = min(known_s, default=None)
             case items.SetSpeedItem():
                 speeds = speeds.changed_to(action)
@@ -177,6 +178,7 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
         if isinstance(action, items.ReturnItem | items.LandItem):
             lasts_s = -flown.target_m[2] / defaults.LANDING_M_S + LANDING_EXTRA_S
         lasts_s = None if lasts_s is None else lasts_s + flown.duration_s
+        until_now_s += lasts_s or 0.0
         yield Leg(step, place, planned.trajectory, lasts_s, planned.is_detour)
         place = flown.target_m
 

@@ -52,7 +52,7 @@ class SetpointLimits(StrictModel):
     """From the vehicle to a setpoint. PX4 answers one that lies d ahead with 0.95/s * d: 5 m are 4.75
     m/s. Recoveries ask for up to 3 m; a setpoint further off is an estimate that jumped or a mistake."""
     max_tilt_deg: Annotated[Positive, Field(le=60.0)] = 45.0
-    """Of what a setpoint's acceleration asks for sideways: PX4's own limit."""
+    """Of an attitude, and of what an acceleration asks for sideways: PX4's own limit."""
 
 
 class Resume(StrictModel):

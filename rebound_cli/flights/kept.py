@@ -8,6 +8,7 @@ import fcntl
 import os
 import re
 import shutil
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from rebound_cli.inputs.documents import nearest
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_records, read_text, whole_lines
 
-# As `create_run_folder` names them. A folder that a person has named is that person's.
+# As `create_run_folder` names them.
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
 # Some packets, however long they are.
 _FIRST_BYTES = 1000
@@ -55,6 +56,11 @@ class KeptFlight:
     @property
     def name(self) -> str:
         return self.folder.name
+
+    @property
+    def is_ours(self) -> bool:
+        """A folder that a person has named is that person's."""
+        return _NAMED_BY_US.fullmatch(self.name) is not None
 
     def is_being_flown(self) -> bool:
         """Its recorder holds a lock, which the kernel takes away with the process."""
@@ -134,8 +140,11 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
         tlog = folder / TLOG_NAME
         # One that another program has just removed is none.
         with suppress(FileNotFoundError):
-            if name and not folder.is_symlink() and tlog.is_file() and not (folder / run_folder.AIRFRAME_NAME).exists():
-                found.append((name[1], tlog.stat().st_mtime, KeptFlight(folder, size_of(folder))))
+            is_flight = tlog.is_file() and not folder.is_symlink() and not folder.name.startswith(_GOING)
+            if is_flight and not (folder / run_folder.AIRFRAME_NAME).exists():
+                ended_s = tlog.stat().st_mtime
+                began = name[1] if name else time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(ended_s))
+                found.append((began, ended_s, KeptFlight(folder, size_of(folder))))
     return [flight for *_, flight in sorted(found, key=lambda entry: entry[:2])]
 
 
@@ -198,7 +207,7 @@ class Ring:
             shutil.rmtree(folder, ignore_errors=True)
         disk = shutil.disk_usage(self._runs)
         max_use_bytes, keep_free_bytes = limits_of(self._config, disk.total)
-        others = [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
+        others = [each for each in kept_flights(self._runs) if each.is_ours and each.folder != self._present]
         present_bytes = size_of(self._present) if self._present.exists() else 0
         used_bytes = sum(flight.size_bytes for flight in others) + present_bytes
         to_go = max(used_bytes - max_use_bytes, keep_free_bytes - disk.free)

@@ -101,10 +101,12 @@ def load_document(path: Path, shipped_names: Iterable[str] = ()) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        names = [path.with_name(entry.name) for entry in path.parent.glob("*.yaml")]
         # A name alone may be meant for one that ships.
-        shipped = shipped_names if path.name == str(path) else ()
-        raise DocumentError(f"{path}: no such file{suggestion(str(path), [*map(str, names), *shipped])}") from None
+        places = {entry.name: path.with_name(entry.name) for entry in path.parent.glob("*.yaml")}
+        places |= {name: Path(name) for name in shipped_names if path.name == str(path)}
+        match = nearest(path.name, tuple(places))
+        meant = f"; did you mean {places[match]}?" if match else "."
+        raise DocumentError(f"{path}: no such file{meant}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise DocumentError(f"{path}: cannot be read: {reason}.") from error
@@ -259,6 +261,10 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
         least, most = (error["ctx"].get(name) for name in ("min_length", "max_length"))
         bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
         return f"needs {bound} of them, and has {error['ctx']['actual_length']}"
+    if kind == "union_tag_invalid":
+        tag, tags = error["ctx"]["tag"], [each.strip("' ") for each in error["ctx"]["expected_tags"].split(",")]
+        match = nearest(tag, tags)
+        return f"'{tag}' is none of {', '.join(tags)}" + (f"; did you mean {match}?" if match else "")
     message = str(error["msg"]).removeprefix("Value error, ")
     message = message.replace("Input should be", "must be").rstrip(".")
     message = _OF_THE_MODEL.sub(lambda found: "a list" if "tuple" in found[0] else "a mapping", message)

@@ -36,8 +36,10 @@ def load_mission_document(
     document = load_document(path, shipped_missions())
     if companion is not None:
         settings = load_document(companion)
-        validated(CompanionConfig, settings, settings.data.get("companion") or {}, ("companion",))
-        document.data["companion"] = settings.data.get("companion") or {}
+        if "companion" not in settings.data:
+            raise DocumentError(f"{companion}: has no companion: part; write the settings below it.")
+        validated(CompanionConfig, settings, settings.data["companion"] or {}, ("companion",))
+        document.data["companion"] = settings.data["companion"] or {}
     _apply_options(document, sets, airframe, seed)
     return document
 
@@ -153,6 +155,10 @@ def _load_airframe(name: str) -> "Airframe":
     if "/" not in name and not name.endswith((".yaml", ".yml")):
         return load_built_in(name)
     own = load_document(Path(name), built_in_airframes())
+    missing = [key for key, field in Airframe.model_fields.items() if field.is_required() and key not in own.data]
+    if "based_on" not in own.data and missing:
+        known = ", ".join(built_in_airframes())
+        raise DocumentError(f"{name}:1: add based_on with one of {known}; else write out {', '.join(missing)}, too.")
     return validated(Airframe, own, with_base(own.data))
 
 

@@ -66,3 +66,9 @@ def open_signed(
 def refused_packets(connection: Connection | None) -> dict[str, int]:
     """How many, by reason; of a connection without a key, none."""
     return dict(connection.signing.refused) if isinstance(connection, SignedConnection) else {}
+
+
+def unheard_text(connection: Connection) -> str:
+    """What is added where no vehicle was heard: its packets may have been refused."""
+    refused = sum(refused_packets(connection).values())
+    return f" {refused} packets were refused: do both ends sign, with the same key?" if refused else ""

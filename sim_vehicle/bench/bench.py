@@ -7,11 +7,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import Airframe, load_airframe_file, load_built_in
 from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, THICKNESS_M, strike
 from sim_vehicle.bench.truth import Timeline, TimelineEntry, Truth, truth_of
@@ -66,8 +67,11 @@ class Setup:
         return {name: int(v) if definitions()[name].is_whole else float(v) for name, v in self.parameters.items()}
 
     def airframe_loaded(self) -> Airframe:
-        """Raises AirframeError for a name that there is not."""
-        return self.airframe if isinstance(self.airframe, Airframe) else load_built_in(self.airframe)
+        """Raises AirframeError for a name that there is not, and for a file that is none."""
+        if isinstance(self.airframe, Airframe):
+            return self.airframe
+        is_file = self.airframe.endswith((".yaml", ".yml"))
+        return load_airframe_file(Path(self.airframe)) if is_file else load_built_in(self.airframe)
 
 
 class Handle(ExitStack):
@@ -209,6 +213,8 @@ class LockstepVehicle(Bench):
         """Advance time in whole intervals (4 ms unless IMU_INTEG_RATE is changed), at least one; return what the
         vehicle has sent.
         """
+        if not 0.0 <= seconds < math.inf:
+            raise ValueError(f"time advances by seconds, from 0 on, not by {seconds!r}")
         until_us = self.vehicle.time_boot_us + round(1e6 * seconds)
         sent = self._step()
         while self.vehicle.time_boot_us < until_us:

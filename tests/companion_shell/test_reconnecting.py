@@ -134,6 +134,16 @@ def test_a_setpoint_to_a_line_that_has_just_gone_is_lost_and_no_error(by_id, clo
     assert "lost" in until_told(connection, "lost")
 
 
+def test_of_two_programs_on_a_port_the_second_is_refused_or_waits(by_id, closing):
+    line = closing(Line(by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"))
+    first = open_connection(f"serial://{line.path}:115200")
+    with pytest.raises(ConnectionSetupError, match="in use by another program"):
+        open_connection(f"serial://{line.path}:115200")
+    second = closing(open_connection(f"serial://{line.path}:115200", waits=True))
+    first.close()
+    assert until_told(second, "connected") == f"connected: {line.path}"
+
+
 def test_a_port_that_may_not_be_opened_is_told_at_once_to_whoever_waits(tmp_path):
     # Waiting gives nobody the rights to a device; here it is a folder
     with pytest.raises(ConnectionSetupError, match="cannot be opened"):

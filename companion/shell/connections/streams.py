@@ -1,5 +1,6 @@
 """Byte streams to a vehicle, TCP and serial: opened again when they end, without anybody waiting for it."""
 
+import errno
 import os
 import select
 import socket
@@ -232,10 +233,19 @@ class SerialConnection(StreamConnection):
         missing = None if os.path.exists(path) else f"Serial port {path} does not exist: is the cable plugged in?"
         if missing is not None and not waits:
             raise ConnectionSetupError(missing)
+        stream = None
         try:
             stream = self._device() if missing is None else None
+        except BlockingIOError as error:
+            # As long as the one before says its last words.
+            missing = f"Serial port {path} is in use by another program: stop that first."
+            if not waits:
+                raise ConnectionSetupError(missing) from error
         except (OSError, ValueError) as error:
-            raise ConnectionSetupError(f"Serial port {path} cannot be opened: {plain(error)}.") from error
+            number = error.errno if isinstance(error, OSError) else None
+            text = f"Serial port {path} cannot be opened: {os.strerror(number).lower() if number else error}."
+            text += " Its group, often dialout, may: sudo usermod -aG dialout $USER." if number == errno.EACCES else ""
+            raise ConnectionSetupError(text) from error
         super().__init__(stream, self._device, missing)
 
     def _device(self) -> Stream:
@@ -245,8 +255,13 @@ class SerialConnection(StreamConnection):
         if self._links and not links:
             raise FileNotFoundError(self._links[0])
         path = str(links[0]) if links else self._path
-        # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports.
-        stream = Stream(serial.Serial(path, self._baud), path, BITS_A_BYTE / self._baud)
+        # 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports. Of two programs on a port
+        # each would hear a part.
+        try:
+            port = serial.Serial(path, self._baud, exclusive=True)
+        except serial.SerialException as error:
+            raise BlockingIOError(str(error)) if error.errno == errno.EWOULDBLOCK else error from None
+        stream = Stream(port, path, BITS_A_BYTE / self._baud)
         device = Path(path).resolve()
         self._links = sorted(link for link in SERIAL_BY_ID.glob("*") if link.resolve() == device)
         return stream

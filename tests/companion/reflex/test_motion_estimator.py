@@ -12,7 +12,7 @@ from companion.motion.config import CURRENT_US, SAME_M_S, TILT_RAD_PER_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
 from companion.reflex.belief.motion_estimator import MotionEstimator
-from companion.reflex.config import CORRECTED_US, TILT_PER_S, UNCORRECTED_US, EstimateConfig
+from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, UNCORRECTED_US, EstimateConfig
 from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
@@ -45,6 +45,8 @@ def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_co
     assert found.is_valid is not is_second
     found.imu(Strapdown(time_boot_us=next_us + CORRECTED_US + 1))
     assert found.is_valid and not found.has_faded
+    # However hard it was, a vehicle's level is no further off than where it tips over
+    assert reckoned((20.0, 0.0, 0.0)).tilt_error_rad(HIT_US + UNCORRECTED_US) == TIPPED_RAD
 
 
 def missing(since_s, late_s, rad_s, damping):

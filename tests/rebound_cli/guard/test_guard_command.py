@@ -1,10 +1,12 @@
 """`rebound guard` as a person or a service runs it, also at the end of a serial line that is pulled out."""
 
+import errno
 import json
 import os
 import signal
 import threading
 import time
+from unittest.mock import patch
 
 import pytest
 import yaml
@@ -27,13 +29,24 @@ pytestmark = pytest.mark.realtime
 PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 
-def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
+def test_nobody_there_is_said_once_and_leaves_no_flight(tmp_path):
     quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
-    done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
-    assert done.returncode == 1
+    done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path / "run", *quick)
+    assert done.returncode == 1 and "log in" not in done.stdout
     assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
-    assert json.loads((tmp_path / "summary.json").read_text())["collisions"] == []
-    assert json.loads((tmp_path / "summary.json").read_text())["left_alone"] == 0
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_disk_that_is_full_keeps_no_vehicle_from_being_guarded(tmp_path):
+    # Given a disk on which nothing can be written
+    with patch(
+        "rebound_cli.results.run_folder.write_json", side_effect=OSError(errno.ENOSPC, "No space left on device")
+    ):
+        quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
+        done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path / "run", *quick)
+    # Then it is told, and the vehicle is looked for all the same
+    assert f"{tmp_path / 'run'}: not all can be written: no space left on device" in done.stdout
+    assert "No HEARTBEAT" in done.stderr
 
 
 def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import load_built_in
-from sim_vehicle.errors import FaultError, ParameterError, SceneError
+from sim_vehicle.errors import AirframeError, FaultError, ParameterError, SceneError
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.truth_file import load_clock
 from sim_vehicle.testing import FaultRequest, LockstepVehicle, Motion, Pole, Wall, faults, save_truth
@@ -250,3 +250,17 @@ def test_bad_setups_are_one_sentence() -> None:
         LockstepVehicle(obstacles=[{"point_ned_m": (2, 0, 0), "normal_ned": (-1, 0, 0)}])
     with pytest.raises(SceneError, match="up to 800 m/s, not 1000 m/s"):
         LockstepVehicle().hit(1000.0)
+
+
+def test_an_airframe_of_ones_own_comes_from_its_file_and_time_goes_on_alone(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("based_on: rigid\nmass_kg: 1.05\n")
+    vehicle = LockstepVehicle(airframe=str(file))
+    assert vehicle.setup.airframe_loaded().mass_kg == 1.05
+    for backwards in (-1.0, math.nan):
+        with pytest.raises(ValueError, match="time advances by seconds"):
+            vehicle.advance(backwards)
+    for text, words in (("mass_kg: [", "cannot be read"), ("based_on: rigid\ninertia_kg_m2: [3.4, 3.4, 5.3]", "g m")):
+        file.write_text(text)
+        with pytest.raises(AirframeError, match=words):
+            LockstepVehicle(airframe=str(file))
