@@ -415,18 +415,21 @@ def load_built_in(name: str) -> Airframe:
         raise AirframeError(
             f"no airframe is called '{name}': {meant} {', '.join(built_in_airframes())} or a file's path"
         )
-    return load_airframe_file(BUILT_IN_FOLDER / f"{name}.yaml")
+    data = yaml.safe_load((BUILT_IN_FOLDER / f"{name}.yaml").read_text())
+    return Airframe.model_validate(with_base(data))
 
 
-def load_airframe_file(path: Path) -> Airframe:
-    """Raises AirframeError for what is no airframe's file."""
+def load_airframe(name: str) -> Airframe:
+    """A built-in one, or that of a file; raises AirframeError where there is none."""
+    if not name.endswith((".yaml", ".yml")):
+        return load_built_in(name)
     try:
-        return Airframe.model_validate(with_base(yaml.safe_load(path.read_text())))
+        return Airframe.model_validate(with_base(yaml.safe_load(Path(name).read_text())))
     except ValidationError as problem:
         first = problem.errors()[0]
-        raise AirframeError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from problem
+        raise AirframeError(f"{name}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from problem
     except (OSError, TypeError, ValueError, yaml.YAMLError) as problem:
-        raise AirframeError(f"{path} cannot be read as an airframe: {problem}") from problem
+        raise AirframeError(f"{name} cannot be read as an airframe: {problem}") from problem
 
 
 def with_base(data: Mapping[str, Any]) -> dict[str, Any]:

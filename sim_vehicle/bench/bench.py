@@ -7,12 +7,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from sim_vehicle.airframe import Airframe, load_airframe_file, load_built_in
+from sim_vehicle.airframe import Airframe, load_airframe
 from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, THICKNESS_M, strike
 from sim_vehicle.bench.truth import Timeline, TimelineEntry, Truth, truth_of
@@ -68,10 +67,7 @@ class Setup:
 
     def airframe_loaded(self) -> Airframe:
         """Raises AirframeError for a name that there is not, and for a file that is none."""
-        if isinstance(self.airframe, Airframe):
-            return self.airframe
-        is_file = self.airframe.endswith((".yaml", ".yml"))
-        return load_airframe_file(Path(self.airframe)) if is_file else load_built_in(self.airframe)
+        return self.airframe if isinstance(self.airframe, Airframe) else load_airframe(self.airframe)
 
 
 class Handle(ExitStack):
