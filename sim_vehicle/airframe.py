@@ -317,9 +317,6 @@ class Airframe(Part):
         # A flat body has as much about one axis as about the two others; files give three digits.
         if 2.0 * max(x, y, z) > 1.01 * (x + y + z):
             raise ValueError("inertia_kg_m2: one is more than the two others together, which no body has")
-        most_kg_m2 = self.mass_kg * self.geometry.reach_m**2
-        if max(x, y, z) > most_kg_m2:
-            raise ValueError(f"inertia_kg_m2: all mass at the rim would have {most_kg_m2:.3g}; are these g m^2?")
         tip_kg, radius_m = self.arms.tip_mass_kg, self.geometry.motor_radius_m
         squares_m2 = [math.hypot(*rotor.place_frd_m) ** 2 for rotor in self.rotors] or 4 * [radius_m**2]
         if tip_kg * len(squares_m2) >= self.mass_kg or tip_kg * sum(squares_m2) >= z:

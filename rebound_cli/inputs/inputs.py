@@ -159,7 +159,12 @@ def _load_airframe(name: str) -> "Airframe":
     if "based_on" not in own.data and missing:
         known = ", ".join(built_in_airframes())
         raise DocumentError(f"{name}:1: add based_on with one of {known}; else write out {', '.join(missing)}, too.")
-    return validated(Airframe, own, with_base(own.data))
+    airframe = validated(Airframe, own, with_base(own.data))
+    most_kg_m2 = airframe.mass_kg * airframe.geometry.reach_m**2
+    if max(airframe.inertia_kg_m2) > most_kg_m2:
+        place, text = own.place_of(("inertia_kg_m2",)), f"all mass at the rim would have {most_kg_m2:.3g}"
+        raise DocumentError(f"{place}: inertia_kg_m2: {text}; are these g m^2?")
+    return airframe
 
 
 def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]:

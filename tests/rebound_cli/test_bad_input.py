@@ -330,6 +330,9 @@ def test_what_is_wrong_in_an_airframes_file_names_that_file(tmp_path):
     own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
     text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
     assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text
+    own.write_text("based_on: foldable\nname: heavy\ninertia_kg_m2: [3.4, 3.4, 5.3]\n")
+    text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
+    assert text.startswith(f"{own}:3: inertia_kg_m2: all mass at the rim") and text.endswith("are these g m^2?")
 
 
 def test_of_thousands_of_faults_the_first_ones_are_shown():
