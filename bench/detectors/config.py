@@ -5,12 +5,11 @@ from typing import Any, ClassVar
 
 from bench.detectors.contact import Threshold
 from bench.detectors.force import FuzzyDetector, LateralDetector, ThresholdDetector
-from bench.detectors.observers import HybridDetector, MomentumDetector, TrackingDetector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.reflex.detection.detector import Detector
 
-BASELINES = (FuzzyDetector, HybridDetector, LateralDetector, MomentumDetector, ThresholdDetector, TrackingDetector)
+BASELINES = (FuzzyDetector, LateralDetector, ThresholdDetector)
 
 
 class BaselineConfig(CompanionConfig):
@@ -24,19 +23,12 @@ class BaselineConfig(CompanionConfig):
     }
     # As in its authors' program.
     fuzzy: Threshold = Threshold(threshold_m_s2=9.81)
-    # Wind and the thrust's lag of 20 ms make up to 4 m/s^2 on a vehicle that manoeuvres.
-    hybrid: Threshold = Threshold(threshold_m_s2=6.0)
     # Above the noise of a quiet vehicle: the simulated HIGHRES_IMU's 0.25 m/s^2 RMS per axis stays below 1.5 at
     # six sigma, and drag changes by less than 1.1 within the mean's memory. Below the signal: eq. 2 begins with
     # b_s * v_c = 30 m/s^2 at 1 m/s, of which a 4 ms mean that saw the last millisecond shows 7.5.
     lateral: Threshold = Threshold(threshold_m_s2=4.0)
-    # A velocity that is wrong by 0.03 m/s makes 20/s times that, 0.6 m/s^2; manoeuvres with a thrust that is told
-    # 20 ms late make up to 3.
-    momentum: Threshold = Threshold(threshold_m_s2=5.0)
     # As in its authors' program.
     threshold: Threshold = Threshold(threshold_m_s2=20.0)
-    # It looks at no force.
-    tracking: None = None
 
 
 class BaselineMission(Mission):

@@ -7,9 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from companion.messages import (
     Attitude,
-    AttitudeTarget,
     ImuSample,
-    LocalPosition,
     MessageId,
     Quaternion,
     Sample,
@@ -32,7 +30,7 @@ class Threshold(StrictModel):
 
 @dataclass(slots=True)
 class BaselineState(DetectorState):
-    """Adds what the vehicle said last of its attitude and its thrust; changed in place."""
+    """Adds what the vehicle said last of its attitude; changed in place."""
 
     attitude_wxyz: Quaternion = LEVEL
 
@@ -47,14 +45,13 @@ class Reading(NamedTuple):
 
 
 class Baseline(ABC):
-    """Built from its settings, as the drone's own detector is. Each looks at samples of one kind."""
+    """Built from its settings, as the drone's own detector is."""
 
     losses: ClassVar[Mapping[MessageId, str]] = {}
     state: ClassVar[type[BaselineState]] = BaselineState
-    looks_at: ClassVar[type[ImuSample | LocalPosition]] = ImuSample
 
-    def __init__(self, config: Threshold | None, averaging_interval_us: int) -> None:
-        self._least_m_s2 = 0.0 if config is None else config.threshold_m_s2
+    def __init__(self, config: Threshold, averaging_interval_us: int) -> None:
+        self._least_m_s2 = config.threshold_m_s2
         self._averaging_us = averaging_interval_us
 
     def initial(self) -> Any:
@@ -63,9 +60,7 @@ class Baseline(ABC):
     def step(self, state: Any, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if isinstance(sample, Attitude):
             state.attitude_wxyz = sample.attitude_wxyz
-        elif isinstance(sample, AttitudeTarget):
-            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        elif isinstance(sample, self.looks_at):
+        elif isinstance(sample, ImuSample):
             reading = self.look(state, sample, situation)
             if reading is not None:
                 impact = judge(state, sample.time_boot_us, reading, situation.off_reason)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bench.fly import campaign as running
-from bench.fly.campaign import CODE, CampaignError, record_path, run_campaign
+from bench.fly.campaign import CODE, CampaignError, run_campaign
 from bench.rows.judge import work_out_mission
 from bench.studies import kills
 from bench.studies.detection.detectors import work_out_hit
@@ -92,13 +92,6 @@ def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, mon
     # Then only what was missing or had failed is worked out, and the results are the same
     assert again == [4, *range(10, 30)]
     assert resumed == whole
-
-
-@pytest.mark.parametrize("line", [b"nonsense", b"\xff", b"3", b'{"result":1}', b'{"case":[]}'])
-def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
-    record_path("throws", throw, tmp_path).write_bytes(line + b"\n")
-    with pytest.raises(CampaignError, match=r"is damaged in line 1; move it away\.$"):
-        campaign(tmp_path)
 
 
 # --- its version is made of all code that its rows follow from

@@ -10,11 +10,10 @@ import pytest
 from bench.faults.catalogue import FLOWN, GROUPS
 from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
-from bench.fly.by_hand.ways_down import FALLS, FALLS_FROM_M, LANDINGS, GroundCase
 from bench.fly.packets import ARM, SET_MODE, made, outside
 from bench.studies.ablation import Rule, flights_table, switched
-from bench.studies.detection.hand import HandCase, fly_by_hand, text_of
-from bench.studies.detection.landings import fly_to_the_ground, judged
+from bench.studies.detection.hand import text_of
+from bench.studies.detection.landings import judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from companion.reflex import surface
@@ -170,20 +169,6 @@ def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
     assert sum("seed 1" in line for line in lines) == 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", ["POSCTL", "ALTCTL", "STABILIZED"])
-def test_a_flight_by_hand_is_vigorous_and_is_watched_in_every_mode(mode, monkeypatch):
-    # Given ten seconds in place of a minute
-    monkeypatch.setattr("bench.fly.by_hand.hand_pilot.FLOWN_S", 10.0)
-    # When a drawn vehicle is flown by drawn sticks
-    row = fly_by_hand(HandCase(7, mode))
-    # Then it leant by 20 degrees and more, met nothing, and was watched all the time
-    assert row["flown_s"] == pytest.approx(10.0, abs=0.1)
-    assert row["tilt_deg"][1] > 20.0
-    assert not row["touched"]
-    assert all(watched["watched_s"] >= 10.0 for watched in row["watched"])
-
-
 TOUCHED_S = 5.0
 LANDED, FALLEN = False, True
 
@@ -210,26 +195,3 @@ def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reporte
     assert judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows) == (outcome, wrong)
     # And one that never touches the ground shows nothing
     assert judged(is_fall, None, None, rows) == ("not there", "the ground was not reached")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("way", LANDINGS)
-def test_a_landing_meets_the_ground_level_at_the_speed_that_was_asked_for(way):
-    # When a drawn vehicle lands
-    row = fly_to_the_ground(GroundCase(8, 250, way, "hard"))
-    # Then it is there, level, about as fast as asked for
-    assert row["touched_s"] is not None
-    assert row["tilt_deg"] < 5.0
-    assert row["sink_m_s"] == pytest.approx(row["asked_m_s"], abs=0.25)
-
-
-@pytest.mark.slow
-def test_falls_meet_the_ground_as_fast_as_their_height_says_and_at_any_tilt():
-    # When vehicles fall whose motors stop, some of them after one alone
-    rows = [fly_to_the_ground(GroundCase(seed, 250, way, "soft")) for seed in (3, 6, 9) for way in FALLS[:2]]
-    # Then none is faster than a fall from the highest height, and none slower than from the lowest
-    low_m_s, high_m_s = (math.sqrt(2.0 * 9.81 * height_m) for height_m in FALLS_FROM_M)
-    assert all(0.8 * low_m_s < row["sink_m_s"] < 1.05 * high_m_s for row in rows)
-    # and what loses one motor first is tipped, by up to more than a right angle
-    assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[0]) < 20.0
-    assert max(row["tilt_deg"] for row in rows if row["way"] == FALLS[1]) > 60.0
