@@ -136,6 +136,9 @@ class MissionFlight:
         if self._work is Work.ITEM:
             if command == kinds.LAND:
                 return view.landed
+            if command == kinds.DELAY:
+                stays = Acceptance(math.inf, math.inf, inside_s=max(item.params[0], 0.0))
+                return self._arrival.is_reached(self.target, stays, view, self._parameters)
             if command not in kinds.WITH_POSITION:
                 return True
             if command == kinds.LOITER_UNLIMITED or not math.isfinite(item.place.altitude_m):

@@ -84,11 +84,12 @@ def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
 def test_times_radius_and_heading_are_kept_before_an_item_is_over():
     stays = item(kinds.WAYPOINT, 10.0, params=(4.0, 0.3, 0.0, 90.0))
     waits = item(kinds.LOITER_TIME, 10.0, params=(3.0, 0.0, 0.0, math.nan))
-    flight = begun(TAKEOFF, stays, waits, NORTH)
+    flight = begun(TAKEOFF, stays, waits, kinematic_plant.action(kinds.DELAY, 2.0), NORTH)
     flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 0.3, 60.0)
     assert 4.0 < reached(flight, 1) < 6.0
     assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
     assert reached(flight, 2) == pytest.approx(3.0, abs=0.15)
+    assert reached(flight, 3) == pytest.approx(2.0, abs=0.15)
 
 
 def test_speed_is_changed_for_what_follows():
