@@ -62,9 +62,8 @@ class MotorWatch:
 
     earlier_hits: int = 0  # of flights before this one
     damage: Damage | None = None
-    _before: deque[list[float]] = field(
-        default_factory=lambda: deque(maxlen=MOST_BEFORE)
-    )  # of each window: see `_shares`
+    # Of each window: see `_shares`.
+    _before: deque[list[float]] = field(default_factory=lambda: deque(maxlen=MOST_BEFORE))
     _after: list[list[float]] = field(default_factory=list)
     _samples_after: list[Outputs] = field(default_factory=list)
     _window: list[Outputs] = field(default_factory=list)

@@ -41,7 +41,7 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
 
 
 def _is_to_be_higher(flight: FlightContext) -> bool:
-    """Whether the setpoint, or as far as is known another's, is above what counts as on the floor."""
+    """Whether it is asked for more height than the floor's; where nobody knows, it may be."""
     return flight.target is None or -flight.mission_ned_m(flight.target.position_ned_m)[2] > LOW_M
 
 

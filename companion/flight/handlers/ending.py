@@ -121,13 +121,11 @@ def silent_position(flight: FlightContext) -> str | None:
 
 def _outside_fence(flight: FlightContext) -> str | None:
     """Two positions in a row have to say so: one forged or broken packet ends no flight."""
-    most_m, earlier = (
-        flight.mission.abort_when.outside_fence_by_m,
-        flight.vehicle.history.before(flight.latest.time_boot_us),
-    )
+    most_m, latest = flight.mission.abort_when.outside_fence_by_m, flight.latest
+    earlier = flight.vehicle.history.before(latest.time_boot_us)
     if most_m is None or earlier is None:
         return None
-    places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (flight.latest, earlier)]
+    places = [flight.mission_ned_m(flight.reflex.place_ned_m(one)) for one in (latest, earlier)]
     outside_m = min(map(flight.mission.fence.outside_by_m, places))
     return f"the vehicle is {outside_m:.2f} m outside the fence" if outside_m > most_m else None
 
