@@ -9,7 +9,8 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
 # A hundred kilometres: no companion's radio, and no flat map, reaches further.
-Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-100_000.0, le=100_000.0)]
+FARTHEST_M = 100_000.0
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-FARTHEST_M, le=FARTHEST_M)]
 PositionNed = tuple[Coordinate, Coordinate, Coordinate]
 
 

@@ -159,6 +159,7 @@ class FlightContext:
     blind: Lasting = field(default_factory=Lasting)  # the detector, while it is on
     plan_confirmed: bool = False
     stop_put_off: str | None = None  # the reason of a stop that waits until the vehicle is clear of what it has hit
+    is_stop_asked: bool = False  # by a person
     outcome: Outcome | None = None
     reason: str = ""
     fault: str = ""  # of this program

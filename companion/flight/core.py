@@ -132,8 +132,9 @@ class Core(ABC, Generic[FlightT]):
             positions = [each for each in samples if isinstance(each, LocalPosition) and each in history]
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
-            self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
-            if not flight.vehicle.armed or MotorOutputs in kinds:
+            if not flight.fault:
+                self.reflex.follow(samples, flight.height_m if positions else None, flight.vehicle.landed)
+            if not flight.fault and (not flight.vehicle.armed or MotorOutputs in kinds):
                 note_motors(flight, samples, now_us)
         except Exception as error:
             self._fail(error, now_us)

@@ -192,7 +192,9 @@ def _with_lean(target: Target, around: Surroundings, fence: Fence, limits: Setpo
     """The acceleration, held until PX4 notices a silence, stays off surfaces, fence, floor and top."""
     lean, acceleration = target.lean, target.acceleration_ned_m_s2
     assert lean is not None and acceleration is not None, "a lean is one of an acceleration"
-    belief, lean = lean.belief, replace(lean, most_tilt_rad=math.radians(limits.max_tilt_deg))
+    belief, most_tilt_rad = lean.belief, math.radians(limits.max_tilt_deg)
+    if most_tilt_rad < lean.most_tilt_rad:
+        lean = replace(lean, most_tilt_rad=most_tilt_rad)
     ends_m_s = plus(belief.velocity_ned_m_s, lean.held_s, plus(acceleration, 1.0, belief.external_m_s2))
     ends = plus(belief.position_ned_m, 0.5 * lean.held_s, plus(belief.velocity_ned_m_s, 1.0, ends_m_s))
     stops = plus(ends, 0.5 * math.hypot(*ends_m_s) / BRAKES_M_S2, ends_m_s)

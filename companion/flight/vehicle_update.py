@@ -9,13 +9,13 @@ from companion.flight.envelope import longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.reflex.config import HELD_S, LEAST_FRACTION, LIES_US
+from companion.reflex.config import HELD_S, LEAST_FRACTION, LIES_US, LONGEST_LOSS_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
-    vehicle, streams = flight.vehicle, flight.streams
+    vehicle, streams, heard_us = flight.vehicle, flight.streams, flight.vehicle.last_received_us
     mode, armed, conflicts, is_mode_lost = vehicle.mode, vehicle.armed, vehicle.conflicts, False
     if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
         is_mode_lost = vehicle.is_mode_known
@@ -63,7 +63,7 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
             flight.flies = _flies(vehicle)
         is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
-    _advance_trajectory_time(flight, now_us)
+    _advance_trajectory_time(flight, heard_us, now_us)
     if vehicle.conflicts > conflicts:
         last_us, flight.conflict_us = flight.conflict_us, now_us
         # Once a run of contradictions.
@@ -82,8 +82,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     return None
 
 
-def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
-    """After a silence or a late step a trajectory goes on where it was. It does not catch up."""
+def _advance_trajectory_time(flight: FlightContext, heard_us: int, now_us: int) -> None:
+    """After a silence or a late step a trajectory goes on where it was. It does not catch up. `heard_us`: when the
+    vehicle was heard last before this step."""
     before_us, position_us = flight.stepped_us, flight.vehicle.last_position_us
     flight.stepped_us = now_us
     longest_us = round(flight.mission.companion.sight.silence_s * 1e6)
@@ -91,8 +92,9 @@ def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
     is_late = elapsed_us > longest_us
     if position_us == now_us:
         flight.missed_us = 0
-    elif is_late:
-        flight.missed_us += elapsed_us - longest_us
+    elif is_late or (flight.vehicle.last_received_us == now_us and now_us - heard_us > longest_us):
+        # Nor does a link say anything of positions on which nothing came.
+        flight.missed_us += max(elapsed_us, now_us - heard_us) - longest_us
     flight.has_position = position_us is not None and now_us - position_us <= longest_us
     if flight.has_position and not is_late:
         flight.trajectory_us += elapsed_us
@@ -112,6 +114,9 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
 def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, now_us: int) -> None:
     """For how long an attitude is flown on, once all is told that it follows from."""
     autopilot, parameters = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
+    if told.name == autopilot.loss_parameter and not 0.0 <= told.value <= LONGEST_LOSS_S:
+        flight.refusals.add(told.name, now_us)
+        return
     parameters[told.name] = told.value
     if told.name == autopilot.loss_parameter and flight.reflex.loss_s is None and told.value > HELD_S:
         flight.report(now_us, "unattended", longer_loss_text(autopilot, told.value), loss_s=told.value)

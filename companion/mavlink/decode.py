@@ -12,12 +12,14 @@ from companion.autopilot.interface import Autopilot
 from companion.autopilot.known import ASSUMED
 from companion.mavlink.packet import Stray, checksum_holds, message_id_of, packet_length, payload_of, source_of
 from companion.mavlink.readers import ARDUPILOT_READERS, READERS, Reader
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
+from companion.messages import Attitude, AttitudeTarget, AutopilotVersion, ImuSample, LocalPosition, Sample, Sticks
 
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
 # Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
 SAME_BOOT_US = 3_600_000_000
+# Older PX4s send the throttle of MANUAL_CONTROL from -1000 on (until 80ea3a09bb of March 2025).
+UNSIGNED_THROTTLE = (1, 16, 0)
 
 
 class Decoder:
@@ -37,6 +39,7 @@ class Decoder:
         self._vehicle: tuple[int, int] | None = None
         self._has_highres_imu = False
         self._boot_us = 0  # newest 64-bit stamp
+        self._has_signed_throttle = False
 
     def listen_to(self, system_id: int, component_id: int, autopilot: Autopilot = ASSUMED) -> None:
         self._vehicle = (system_id, component_id)
@@ -86,4 +89,10 @@ class Decoder:
             stamp_us = sample.time_boot_us + wraps * WRAP_US
             # Far from the newest one it has not wrapped: the vehicle has rebooted.
             return replace(sample, time_boot_us=stamp_us) if abs(stamp_us - self._boot_us) < SAME_BOOT_US else sample
+        elif isinstance(sample, AutopilotVersion):
+            self._has_signed_throttle |= sample.flight_version < UNSIGNED_THROTTLE
+        elif isinstance(sample, Sticks):
+            pitch, roll, throttle, yaw = sample.deflections
+            self._has_signed_throttle |= throttle < -1.0
+            return Sticks((pitch, roll, 0.5 * (throttle + 1.0), yaw)) if self._has_signed_throttle else sample
         return sample

@@ -303,8 +303,8 @@ def _position_target(type_mask: int, x: float, y: float, z: float, vz: float) ->
 
 
 def _sticks(x: int, y: int, z: int, r: int) -> Sample:
-    # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
-    if not (max(abs(x), abs(y), abs(r)) <= 1000 and 0 <= z <= 1000):
+    # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp), of older ones from -1000 (see decode).
+    if max(abs(x), abs(y), abs(z), abs(r)) > 1000:
         return Refused("MANUAL_CONTROL", f"sticks {x} {y} {z} {r}")
     return messages.Sticks((x / 1000.0, y / 1000.0, z / 500.0 - 1.0, r / 1000.0))
 

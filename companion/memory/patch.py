@@ -14,7 +14,7 @@ from companion.messages import Vector3
 from companion.motion.vector import ZERO, along, minus, plus, unit
 from companion.reflex.config import PLACE_SPREAD_M
 from companion.reflex.surface import Normal, away_from, is_from_behind
-from companion.strict_model import NotNegative, PositionNed, StrictModel
+from companion.strict_model import FARTHEST_M, NotNegative, PositionNed, StrictModel
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
 # touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.
@@ -139,17 +139,19 @@ LEAST_SPEED_M_S = 0.3
 def touch_of(
     centre_ned_m: Vector3, velocity_ned_m_s: Vector3, normal: Normal, reach_m: float, found_at_us: int
 ) -> Patch | None:
-    """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
+    """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known, or the
+    place beyond all that there is.
 
     ``normal`` is horizontal, steep or zero (see surface.away_from). ``reach_m``: centre to the guards' rim.
     """
-    if normal.direction_ned == ZERO:
+    touch = plus(centre_ned_m, -reach_m, normal.direction_ned)
+    if normal.direction_ned == ZERO or not all(abs(part) <= FARTHEST_M for part in touch):
         return None
     is_fast = math.hypot(*velocity_ned_m_s) >= LEAST_SPEED_M_S
     is_behind = is_from_behind(normal.direction_ned, away_from(minus(ZERO, velocity_ned_m_s)))
     # Not validated: an estimate that has run away must not stop the flight here.
     return Patch.model_construct(
-        touches_ned_m=(plus(centre_ned_m, -reach_m, normal.direction_ned),),
+        touches_ned_m=(touch,),
         normal_ned=normal.direction_ned,
         normal_error_deg=min(math.degrees(normal.error_rad), 90.0),
         reaches_m=REACHES_M if is_fast and not is_behind else 0.0,

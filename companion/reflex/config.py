@@ -165,6 +165,8 @@ RESTS_M_S, RESTS_S = 0.2, 0.1
 BRAKES_M_S2 = 3.0
 # An attitude is flown on for COM_OF_LOSS_T: no vehicle that leans by 35 degrees is safe for longer than this.
 MOST_HELD_S = 0.3
+# No vehicle holds one for longer: PX4's most of COM_OF_LOSS_T.
+LONGEST_LOSS_S = 60.0
 
 # --- what a setpoint leads to
 # PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4

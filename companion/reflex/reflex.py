@@ -181,7 +181,7 @@ class Reflex:
     def left_wrong(self, time_boot_us: int) -> LeftWrong | None:
         """Left by the newest hit, and by flying by attitude, in which the vehicle's integrators forget what pushes."""
         newest, share = self.newest, self._left_share(time_boot_us)
-        if newest is None or share <= 0.0 or not self.law.leans:
+        if newest is None or share <= 0.0 or not newest.law.leans:
             return None
         estimator = newest.estimator
         pushed = ZERO if self.keeps_trim else plus(estimator.wind_m_s2, 1.0, estimator.tilted_m_s2)

@@ -138,8 +138,8 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
     for folder in runs.iterdir() if runs.is_dir() else ():
         name = _NAMED_BY_US.fullmatch(folder.name)
         tlog = folder / TLOG_NAME
-        # One that another program has just removed is none.
-        with suppress(FileNotFoundError):
+        # One that another program has just removed is none, nor what may not be looked into.
+        with suppress(OSError):
             is_flight = tlog.is_file() and not folder.is_symlink() and not folder.name.startswith(_GOING)
             if is_flight and not (folder / run_folder.AIRFRAME_NAME).exists():
                 ended_s = tlog.stat().st_mtime

@@ -50,9 +50,13 @@ class Heir:
 
     def close(self) -> None:
         """The companion ends by itself: there is no word."""
-        self._channel.setblocking(True)
         with suppress(OSError):
+            self._channel.setblocking(True)
             self._channel.send(b"[]")
+        self.leave()
+
+    def leave(self) -> None:
+        """The companion ends in the midst of a flight: the last words are said."""
         self._channel.close()
         self._process.wait()
 

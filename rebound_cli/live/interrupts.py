@@ -43,6 +43,8 @@ class Interrupts:
             signal.signal(number, handler)  # type: ignore[arg-type]
 
     def on_signal(self, number: int, _: FrameType | None) -> None:
+        if self._count > 0 and number == signal.SIGHUP:
+            return  # a shell's, and its kernel's: a terminal goes once
         if self._count > 0 and not self._may_insist:
             raise KeyboardInterrupt
         self._count += 1

@@ -168,6 +168,10 @@ class Loop:
                 reason = f"fault around the flight, please report it: {type(error).__name__} in {place.name}: {error}"
                 self._hand_over(reason)
                 raise FlightFaultError(f"F{reason[1:]}; the vehicle was handed over, as far as it answered.") from error
+            except KeyboardInterrupt:
+                if self.heir is not None:
+                    self.heir.leave()
+                raise
             finally:
                 if self.heir is not None:
                     self.heir.close()

@@ -119,7 +119,9 @@ def _listener(path: Path) -> socket.socket:
         if path.parent.stat().st_uid != os.getuid():
             raise OSError(errno.EPERM, "the folder is another user's")
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-            if probe.connect_ex(str(path)) == 0:
+            # One whose program stands still has a full queue.
+            probe.setblocking(False)
+            if probe.connect_ex(str(path)) in (0, errno.EAGAIN):
                 raise OSError(errno.EADDRINUSE, "another program answers there")
         # What a program that was killed has left.
         path.unlink(missing_ok=True)

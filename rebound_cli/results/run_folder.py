@@ -106,7 +106,7 @@ class FlightRecorder:
         self._inputs_file = (folder / INPUTS_NAME).open("w", encoding="utf-8", buffering=1)
         # Not every file system knows locks; without one the flight is only told from others by its process.
         with suppress(OSError):
-            fcntl.flock(self._events_file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(self._events_file, fcntl.LOCK_SH)  # whoever looks whether it is flown has it for a moment
         if writer is not None:
             for entries in (folder, folder.parent):
                 # So that their names outlive a power cut.

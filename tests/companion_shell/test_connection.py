@@ -35,7 +35,8 @@ def test_before_there_is_a_vehicle_the_last_sender_of_a_packet_is_answered():
 
 def test_the_vehicles_heartbeat_pins_its_address():
     peer = Peer()
-    assert peer.accepts(IMU + HEARTBEAT, VEHICLE, 0)
+    unknown = IMU[:7] + b"\xa3\0\0" + IMU[10:]
+    assert peer.accepts(IMU + unknown + HEARTBEAT, VEHICLE, 0)
     for datagram in (b"\0", IMU, HEARTBEAT):
         assert not peer.accepts(datagram, STRANGER, 1)
     assert (peer.answered, peer.counts.stranger_datagrams) == (VEHICLE, 3)
@@ -274,6 +275,7 @@ def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come(monkeypatch):
         ("udpin://203.0.113.9:14540", "203.0.113.9"),
         (f"tcpout://{'a' * 64}.de:5760", "a.de"),
         ("serial:///dev/null:5\N{SUPERSCRIPT TWO}", "baud"),
+        ("serial:///dev/null:4000000000", "baud"),
     ],
 )
 def test_a_bad_address_is_one_sentence_that_names_the_fault(url, named):

@@ -13,6 +13,7 @@ FILTER = "INS_ACCEL_FILTER"
 THRUST_IS_THRUST = 8
 # FRAME_CLASS, for the rotors that MAV_TYPE announces (AP_Motors_Class.h).
 CLASSES = {1: "quadrotor", 2: "hexarotor", 3: "octorotor", 4: "octorotor", 5: "hexarotor", 7: "tricopter"}
+CLASSES |= {12: "dodecarotor", 14: "decarotor"}
 # A low-pass of second order makes a pulse of a jump of the velocity. It is so high for each m/s and Hz: 57 m/s^2
 # for each m/s at the default, 20 Hz.
 PULSE_PER_M_S_HZ = 2.86

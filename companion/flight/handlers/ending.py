@@ -38,14 +38,15 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     if reason is None and inputs.positions and flight.armed_at_us is not None:
         reason = _outside_fence(flight)
         if reason is None:
-            abort = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+            abort = _abort_reason(flight, state, flight.reflex.place_ned_m(flight.latest), now_us)
             reason = _once_clear(flight, state, abort, now_us)
     return None if reason is None else Transition(Trigger.INTERRUPTED, reason)
 
 
 def _stop_reason(flight: FlightContext, state: State, asked: str | None, now_us: int) -> str | None:
     """Why to stop now; asked for twice, in a recovery, too."""
-    if asked is not None and flight.stop_put_off is not None:
+    was_asked, flight.is_stop_asked = flight.is_stop_asked, flight.is_stop_asked or asked is not None
+    if asked is not None and was_asked:
         return asked
     return _once_clear(flight, state, asked or flight.stop_put_off, now_us)
 

@@ -6,7 +6,7 @@ from companion.flight.context import FlightContext, Handler, Inputs, Target, Tra
 from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
-from companion.messages import ARM, Vector3, take_off
+from companion.messages import ARM, LandedState, Vector3, take_off
 from companion.mission.items import TakeoffItem
 from companion.mission.trajectory import LineProfile
 from companion.motion.settling import Lasting
@@ -176,16 +176,17 @@ class Land(Handler[FlightContext]):
         flight.is_landing = True
 
     def _waits(self, flight: FlightContext, now_us: int) -> bool:
-        hits, height_m = flight.hits, flight.height_m
+        hits = flight.hits
         is_hurt = flight.motors.damage is not None or (bool(hits) and hits[-1].settled_after_s is None)
-        is_high = height_m is not None and height_m >= flight.mission.companion.min_detection_height_m
-        if self._target is None or is_hurt or not is_high:
+        if self._target is None or is_hurt or not _is_high(flight):
             return False
         is_moving = not rests(flight, self._near, self._target.position_ned_m)
         return is_moving and now_us - self._started_us < RESTS_WITHIN_US
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
+            if _is_high(flight) and flight.vehicle.landed is not LandedState.ON_GROUND:
+                return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed in the air", is_left=True)
             return Transition(Trigger.DISARMED)
         if not self._is_asked:
             if self._waits(flight, now_us):
@@ -207,6 +208,10 @@ class Land(Handler[FlightContext]):
             seconds = LANDING_TIMEOUT_US // 1_000_000
             return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land", is_left=True)
         return None
+
+
+def _is_high(flight: FlightContext) -> bool:
+    return flight.height_m is not None and flight.height_m >= flight.mission.companion.min_detection_height_m
 
 
 # Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.

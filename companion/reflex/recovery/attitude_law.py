@@ -102,8 +102,7 @@ def attitude_and_thrust(acceleration_ned_m_s2: Vector3, lean: Lean) -> tuple[Qua
     d = min(max(acceleration_ned_m_s2[2], -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2)
     lifts_m_s2 = GRAVITY_M_S2 - d
     margin = reflex.TURN_MARGIN if turns_rad_s > reflex.BRAKED_RAD_S else reflex.HOVER_MARGIN
-    most_tilt_rad = min(lean.most_tilt_rad, reflex.MOST_TILT_RAD)
-    least_cosine = min(max(math.cos(most_tilt_rad), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
+    least_cosine = min(max(math.cos(lean.most_tilt_rad), margin * GRAVITY_M_S2 / full_m_s2), 1.0)
     most_m_s2 = lifts_m_s2 * math.sqrt(1.0 - least_cosine**2) / least_cosine
     # One that turns by more than a radian within its attitude's lag does not get the tilt that is asked for.
     most_m_s2 /= max(1.0, turns_rad_s * reflex.LEAD_S)

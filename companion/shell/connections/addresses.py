@@ -24,6 +24,7 @@ Opened: TypeAlias = UdpConnection | StreamConnection
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
 _MOST_PORT = 65_535  # 16 bits
+MOST_BAUD = 20_000_000  # no UART of a flight controller is faster
 _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
@@ -68,7 +69,7 @@ def parsed(url: str) -> Endpoint:
         raise AddressError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
     if scheme == "serial":
         device, _, baud = rest.rpartition(":")
-        if not device or not baud.isdecimal() or int(baud) == 0:
+        if not device or not baud.isdecimal() or not 0 < int(baud) <= MOST_BAUD:
             raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
         return Endpoint(url, scheme, device, int(baud))
     match = _HOST_PORT.match(rest)

@@ -101,8 +101,9 @@ class Peer:
 
 
 def _packets(datagram: bytes) -> Iterator[bytes]:
-    """The packets of known messages that a datagram begins with, their checksums right."""
+    """The packets of known messages in a datagram, up to one whose checksum is wrong."""
     for packet in whole_packets(datagram):
-        if message_id_of(packet) not in KNOWN_IDS or not checksum_holds(packet, 0, len(packet)):
+        if not checksum_holds(packet, 0, len(packet)):
             return
-        yield packet
+        if message_id_of(packet) in KNOWN_IDS:
+            yield packet

@@ -1,6 +1,10 @@
 """Who flies: requests, failsafes and the pilot are told apart, at any instant; and the companion never fights."""
 
+import math
+from unittest.mock import Mock
+
 import pytest
+from pymavlink.dialects.v20 import development as mav
 
 from bench.fly.packets import made
 from bench.fly.virtual_time import INTERVAL_US
@@ -21,10 +25,6 @@ def assert_silent_from_now(f: Flight) -> None:
     assert len(f.vehicle.commands) == commands
 
 
-def is_disarmed(vehicle: FakeVehicle) -> None:
-    vehicle.armed = False
-
-
 @pytest.mark.parametrize("state", IN_THE_AIR)
 @pytest.mark.parametrize(
     ("takes", "seen_in", "within_s", "words"),
@@ -34,7 +34,7 @@ def is_disarmed(vehicle: FakeVehicle) -> None:
         (lambda vehicle: vehicle.failsafe_takes(LOITER), "current_mode", 0.6, "a failsafe of the vehicle took over"),
         # HEARTBEAT alone tells it once a second, and tells it twice before it counts
         (lambda vehicle: vehicle.failsafe_takes(LOITER), "heartbeat", 2.5, "a failsafe of the vehicle took over"),
-        (is_disarmed, "heartbeat", 2.1, "disarmed"),
+        (lambda vehicle: setattr(vehicle, "armed", False), "heartbeat", 2.1, "disarmed"),
     ],
     ids=["pilot", "failsafe", "failsafe in heartbeats", "disarmed"],
 )
@@ -42,9 +42,6 @@ def test_whoever_takes_the_vehicle_ends_the_flight_and_is_named(state, takes, se
     f = flying_in(state)
     f.vehicle.no_current_mode = seen_in == "heartbeat"
     takes(f.vehicle)
-    if state == "landing" and takes is is_disarmed:
-        f.run_to("done", within_s)
-        return
     f.run_to("aborted", within_s + 1.8 if state == "landing" else within_s)
     assert f.companion.finished and f.report.outcome == "aborted" and words in f.report.reason
     assert_silent_from_now(f)
@@ -114,11 +111,39 @@ def test_a_mission_that_is_to_end_at_a_wall_ends_once_the_vehicle_is_clear_but_o
     f.run_to("recovering")
     outside = f.copy()
     f.vehicle.battery_percent = 40
+    f.run_until(lambda: "stopping" in f.kinds(), 1.0)
+    f.companion.stop("Ctrl-C, and for the first time")
     f.run_to_end(8.0)
     assert "recovered" in f.kinds() and f.report.reason.startswith("battery at 40 %")
     outside.vehicle.position[1] += 30.0
     outside.run_to_end(2.0)
     assert "recovered" not in outside.kinds() and "outside the fence" in outside.report.reason
+
+
+def test_a_fault_that_comes_back_in_every_step_is_told_twice_at_most_and_hands_over(monkeypatch):
+    f = flying_in("mission")
+    monkeypatch.setattr(type(f.companion.core.reflex), "follow", Mock(side_effect=ValueError("again")))
+    f.run_to_end(2.0)
+    assert f.vehicle.mode == LOITER and f.kinds().count("fault") <= 2
+
+
+@pytest.mark.parametrize("state", ["mission", "recovering"])
+def test_a_silence_that_is_shorter_than_the_links_limit_ends_nothing_whatever_is_heard_first(state):
+    f = flying_in(state)
+    f.vehicle.silent = True
+    f.run_for(1.3)
+    f.vehicle.silent = False
+    f.run_for(0.5)
+    assert "aborted" not in f.kinds()
+
+
+def test_a_time_for_which_no_vehicle_holds_a_setpoint_is_refused():
+    f = flying_in("mission")
+    loss_s = f.companion.core.reflex.loss_s
+    for value in (-0.3, 1e9, math.nan):
+        f.vehicle.send(mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", value, mav.MAV_PARAM_TYPE_REAL32, 1, 0))
+    f.run_for(0.1)
+    assert f.companion.core.reflex.loss_s == loss_s
 
 
 def test_a_vehicle_that_refuses_to_hold_is_asked_to_land():

@@ -316,3 +316,22 @@ def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
     m = sent(ours.Parameter("COM_OBL_RC_ACT", value))
     assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
     assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
+
+
+@pytest.mark.parametrize("minor", [15, 16, None])
+def test_the_throttle_of_older_px4s_goes_from_minus_a_thousand_on(minor):
+    decoder, link = Decoder(GUARD_READERS), mav.MAVLink(None, 1, 1)
+    decoder.listen_to(1, 1)
+
+    def throttles(*values):
+        told = [mav.MAVLink_manual_control_message(1, 0, 0, value, 0, 0) for value in values]
+        return [sample.deflections[2] for each in told for _, sample in decoder.feed(each.pack(link))]
+
+    if minor is not None:
+        version = mav.MAVLink_autopilot_version_message(
+            0, 1 << 24 | minor << 16, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+        )
+        decoder.feed(version.pack(link))
+    # Where no version is known one below zero tells
+    assert throttles(500) == [0.5 if minor == 15 else 0.0]
+    assert minor == 16 or throttles(-1000, 0, 1000) == [-1.0, 0.0, 1.0]

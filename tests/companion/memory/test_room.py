@@ -86,6 +86,8 @@ def test_the_surface_is_a_guards_reach_ahead_of_the_centre_or_behind_one_that_it
     touch = touch_of((3.0, 1.0, -1.5), (1.0, 0.0, 0.0), Normal(NORTH, ERROR_RAD), 0.2, 0)
     assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
+    # Nor is there anything where an estimate has run away to
+    assert touch_of((2e5, 1.0, -1.5), (1.0, 0.0, 0.0), Normal(NORTH, ERROR_RAD), 0.2, 0) is None
 
 
 # --- patches of the same surface

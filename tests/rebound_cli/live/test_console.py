@@ -140,7 +140,7 @@ def test_all_but_a_yes_is_a_no(line):
     assert not companion.confirm_plan.called
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_is_a_reason_and_the_second_ends_the_program(number):
     before = signal.getsignal(number)
     with Interrupts() as interrupts:
@@ -149,6 +149,13 @@ def test_the_first_signal_is_a_reason_and_the_second_ends_the_program(number):
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), number)
     assert signal.getsignal(number) is before
+
+
+def test_a_terminal_that_goes_says_so_twice_and_ends_nothing_at_once():
+    with Interrupts() as interrupts:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert interrupts.news(is_put_off=False) == "stopped because its terminal is gone"
 
 
 def test_one_that_is_put_off_may_come_once_more_before_the_next_ends_the_program():
@@ -240,6 +247,19 @@ def test_the_socket_of_a_program_that_runs_is_left_to_it(server, path, monkeypat
     with served(told.append, command="fly", folder="-") as second:
         assert second is None
     assert len(told) == 1 and path.exists()
+
+
+def test_the_socket_of_a_program_that_stands_still_keeps_nobody_from_starting(path):
+    # Given one that answers nobody, and is asked by as many as may wait
+    with socket.socket(socket.AF_UNIX) as still, contextlib.ExitStack() as asking:
+        still.bind(str(path))
+        still.listen(0)
+        for _ in range(2):
+            client = asking.enter_context(socket.socket(socket.AF_UNIX))
+            client.setblocking(False)
+            client.connect_ex(str(path))
+        with pytest.raises(status_socket.StatusError, match="another program answers there"):
+            StatusServer(path, {"command": "fly", "folder": "-"})
 
 
 def test_systemds_folder_comes_before_the_sessions_and_without_either_it_is_a_temporary_one(tmp_path, monkeypatch):
