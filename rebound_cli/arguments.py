@@ -6,7 +6,6 @@ import gc
 import importlib
 import math
 import os
-import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -98,8 +97,6 @@ TYPES: Mapping[str, Callable[[str], Any]] = {
 def _run(module: str, name: str, options: argparse.Namespace) -> int:
     # Matrices of a few rows gain nothing from a thread on each core, which numpy would start now.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Python's own SHA-256 signs packets, too: OpenSSL's, which hashlib would load, takes 3.5 MB of a drone's computer.
-    sys.modules.setdefault("_hashlib", None)  # type: ignore[arg-type]
     # What is imported stays: to look for garbage in it takes a fifth of a guard's start.
     gc.disable()
     try:

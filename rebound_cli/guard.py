@@ -63,7 +63,7 @@ def _recorded(
     """One folder: until the end, which is returned, or, then empty, until it is long and the vehicle disarmed."""
     folder, ring = folder_with_room(out, "guard", config.companion.disk)
     settings = config.model_dump(mode="json", exclude_none=True)
-    with _told(console, folder):
+    with _reporting(console, folder):
         run_folder.write_yaml(folder / run_folder.GUARD_NAME, settings)
         run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
@@ -100,10 +100,12 @@ def _recorded(
             **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }
-        with _told(console, folder):
+        with _reporting(console, folder):
             run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
-    if outcome and flight.vehicle.identity is None:
-        shutil.rmtree(folder)  # no vehicle was met: it is no flight
+    if outcome and flight.vehicle.identity is None and not flight.fault:
+        # No vehicle was met: it is no flight. A folder that a person has named may hold files of theirs.
+        if out is None:
+            shutil.rmtree(folder)
         return outcome
     left_alone = f", {flight.left_alone} left to the program that flies" if flight.left_alone else ""
     console.print(f"{summary['outcome']}; {hits_text(len(hits))}{left_alone}; log in {folder}")
@@ -113,8 +115,8 @@ def _recorded(
 
 
 @contextmanager
-def _told(console: Console, folder: Path) -> Iterator[None]:
-    """What cannot be written, as on a full disk, is told, and keeps no vehicle from being guarded."""
+def _reporting(console: Console, folder: Path) -> Iterator[None]:
+    """What cannot be written, as on a full disk, is reported, and keeps no vehicle from being guarded."""
     try:
         yield
     except OSError as error:

@@ -44,6 +44,7 @@ class Autopilot:
     casts_whole_numbers: bool = False
     attitude_mask: int  # ATTITUDE_TARGET_TYPEMASK of an attitude with a rate of yaw alone
     least_version: tuple[int, int, int] = (0, 0, 0)
+    unsigned_throttle_since: tuple[int, int, int] = (0, 0, 0)  # earlier ones send the sticks' throttle from -1000 on
     streams: tuple[VehicleCommand, ...] = ()  # asked for beside those that all autopilots have
     filters_imu: bool = False  # its inertial samples are filtered: none shows that the raw ones were clipped
     lesser_imu: MessageId | None = None  # of boards that do not have HIGHRES_IMU

@@ -129,7 +129,7 @@ class Core(ABC, Generic[FlightT]):
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
             history = flight.vehicle.history
-            positions = [each for each in samples if isinstance(each, LocalPosition) and each in history]
+            positions = [each for each in samples if isinstance(each, LocalPosition) and history.remembers(each)]
             self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             # The height counts where there is a new one.
             if not flight.fault:

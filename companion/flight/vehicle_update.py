@@ -115,7 +115,7 @@ def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, no
     """For how long an attitude is flown on, once all is told that it follows from."""
     autopilot, parameters = flight.vehicle.autopilot, flight.vehicle.attitude_parameters
     if told.name == autopilot.loss_parameter and not 0.0 <= told.value <= LONGEST_LOSS_S:
-        flight.refusals.add(told.name, now_us)
+        flight.refusals.add("PARAM_VALUE", now_us)
         return
     parameters[told.name] = told.value
     if told.name == autopilot.loss_parameter and flight.reflex.loss_s is None and told.value > HELD_S:

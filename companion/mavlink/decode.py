@@ -18,8 +18,6 @@ from companion.messages import Attitude, AttitudeTarget, AutopilotVersion, ImuSa
 WRAP_US = (1 << 32) * 1000
 # Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
 SAME_BOOT_US = 3_600_000_000
-# Older PX4s send the throttle of MANUAL_CONTROL from -1000 on (until 80ea3a09bb of March 2025).
-UNSIGNED_THROTTLE = (1, 16, 0)
 
 
 class Decoder:
@@ -37,12 +35,13 @@ class Decoder:
         self._readers, self._is_packet = readers, is_packet
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
+        self._autopilot = ASSUMED
         self._has_highres_imu = False
         self._boot_us = 0  # newest 64-bit stamp
         self._has_signed_throttle = False
 
     def listen_to(self, system_id: int, component_id: int, autopilot: Autopilot = ASSUMED) -> None:
-        self._vehicle = (system_id, component_id)
+        self._vehicle, self._autopilot = (system_id, component_id), autopilot
         if autopilot.casts_whole_numbers:
             self._readers = {**self._readers, **ARDUPILOT_READERS}
 
@@ -90,7 +89,7 @@ class Decoder:
             # Far from the newest one it has not wrapped: the vehicle has rebooted.
             return replace(sample, time_boot_us=stamp_us) if abs(stamp_us - self._boot_us) < SAME_BOOT_US else sample
         elif isinstance(sample, AutopilotVersion):
-            self._has_signed_throttle |= sample.flight_version < UNSIGNED_THROTTLE
+            self._has_signed_throttle |= sample.flight_version < self._autopilot.unsigned_throttle_since
         elif isinstance(sample, Sticks):
             pitch, roll, throttle, yaw = sample.deflections
             self._has_signed_throttle |= throttle < -1.0

@@ -28,7 +28,7 @@ class MotionHistory:
             samples.popleft()
         return True
 
-    def __contains__(self, sample: LocalPosition) -> bool:
+    def remembers(self, sample: LocalPosition) -> bool:
         """Whether this very sample was remembered; one of the same values may have come late."""
         return any(sample is each for each in reversed(self._samples))
 

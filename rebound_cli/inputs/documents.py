@@ -254,7 +254,8 @@ def _path_in_message(message: str) -> DocumentPath:
 def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
     kind = error["type"]
     if kind == "extra_forbidden":
-        return _unknown_key(str(path[-1]) if path else "?", keys_allowed_at(model, path[:-1]))
+        allowed = keys_allowed_at(model, path[:-1])
+        return _unknown("key", str(path[-1]) if path else "?", allowed)
     if kind == "missing":
         return "is missing; add it"
     if kind in ("too_short", "too_long"):
@@ -262,9 +263,8 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
         bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
         return f"needs {bound} of them, and has {error['ctx']['actual_length']}"
     if kind == "union_tag_invalid":
-        tag, tags = error["ctx"]["tag"], [each.strip("' ") for each in error["ctx"]["expected_tags"].split(",")]
-        match = nearest(tag, tags)
-        return f"'{tag}' is none of {', '.join(tags)}" + (f"; did you mean {match}?" if match else "")
+        tags = [each.strip("' ") for each in error["ctx"]["expected_tags"].split(",")]
+        return _unknown("kind", error["ctx"]["tag"], tags)
     message = str(error["msg"]).removeprefix("Value error, ")
     message = message.replace("Input should be", "must be").rstrip(".")
     message = _OF_THE_MODEL.sub(lambda found: "a list" if "tuple" in found[0] else "a mapping", message)
@@ -278,12 +278,12 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
     return message[:1].lower() + message[1:]
 
 
-def _unknown_key(key: str, allowed: Sequence[str]) -> str:
+def _unknown(what: str, word: str, allowed: Sequence[str]) -> str:
     if not allowed:
-        return f"unknown key '{key}'; no keys are allowed here"
-    match = nearest(key, allowed)
+        return f"unknown {what} '{word}'; no {what}s are allowed here"
+    match = nearest(word, allowed)
     question = f"did you mean '{match}'? Allowed" if match else "allowed"
-    return f"unknown key '{key}'; {question} here: {', '.join(allowed)}"
+    return f"unknown {what} '{word}'; {question} here: {', '.join(allowed)}"
 
 
 def nearest(word: str, choices: Sequence[str]) -> str | None:

@@ -35,9 +35,7 @@ def load_mission_document(
 
     document = load_document(path, shipped_missions())
     if companion is not None:
-        settings = load_document(companion)
-        if "companion" not in settings.data:
-            raise DocumentError(f"{companion}: has no companion: part; write the settings below it.")
+        settings = _with_companion(companion)
         validated(CompanionConfig, settings, settings.data["companion"] or {}, ("companion",))
         document.data["companion"] = settings.data["companion"] or {}
     _apply_options(document, sets, airframe, seed)
@@ -51,9 +49,16 @@ def companion_settings(path: Path | None, sets: Sequence[str] = ()) -> "Companio
     """
     from companion.mission.config import CompanionConfig
 
-    document = load_document(path) if path is not None else Document("no mission file")
+    document = _with_companion(path) if path is not None else Document("no mission file")
     documents.apply_overrides(document, sets, "companion")
     return validated(CompanionConfig, document, document.data.get("companion") or {}, ("companion",))
+
+
+def _with_companion(path: Path) -> Document:
+    document = load_document(path)
+    if "companion" not in document.data:
+        raise DocumentError(f"{path}: has no companion: part; write the settings below it.")
+    return document
 
 
 def _apply_options(document: Document, sets: Sequence[str], airframe: str | None, seed: int | None) -> None:

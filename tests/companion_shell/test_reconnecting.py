@@ -144,7 +144,7 @@ def test_of_two_programs_on_a_port_the_second_is_refused_or_waits(by_id, closing
     assert until_told(second, "connected") == f"connected: {line.path}"
 
 
-def test_a_port_that_may_not_be_opened_is_told_at_once_to_whoever_waits(tmp_path):
+def test_a_port_that_may_not_be_opened_is_reported_at_once_to_whoever_waits(tmp_path):
     # Waiting gives nobody the rights to a device; here it is a folder
     with pytest.raises(ConnectionSetupError, match="cannot be opened"):
         open_connection(f"serial://{tmp_path}:115200", waits=True)

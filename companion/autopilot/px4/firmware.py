@@ -29,6 +29,7 @@ PX4 = Autopilot(
     attitude_mask=0x03,  # PX4's attitude loop makes the rates of roll and pitch
     estimator_message=MessageId.ESTIMATOR_STATUS,
     sticks_message=MessageId.MANUAL_CONTROL,
+    unsigned_throttle_since=(1, 16, 0),  # 80ea3a09bb of March 2025
     wants_setpoints_first=True,
     changed_law=_changed_law,
     attitude_parameters=(setup.LOSS,),

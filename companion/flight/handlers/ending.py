@@ -57,7 +57,7 @@ def _once_clear(flight: FlightContext, state: State, reason: str | None, now_us:
         return reason
     if flight.stop_put_off is None:
         flight.stop_put_off = reason
-        text = f"{reason}: the vehicle is handed over once it is clear; asked once more, at once"
+        text = f"{reason}: the vehicle is handed over once it is clear; after a second stop, at once"
         flight.report(now_us, "stopping", text)
     return None
 

@@ -1,6 +1,5 @@
 """Byte streams to a vehicle, TCP and serial: opened again when they end, without anybody waiting for it."""
 
-import errno
 import os
 import select
 import socket
@@ -242,9 +241,9 @@ class SerialConnection(StreamConnection):
             if not waits:
                 raise ConnectionSetupError(missing) from error
         except (OSError, ValueError) as error:
-            number = error.errno if isinstance(error, OSError) else None
-            text = f"Serial port {path} cannot be opened: {os.strerror(number).lower() if number else error}."
-            text += " Its group, often dialout, may: sudo usermod -aG dialout $USER." if number == errno.EACCES else ""
+            text = f"Serial port {path} cannot be opened: {plain(error)}."
+            if isinstance(error, PermissionError):
+                text += " Its group, often dialout, may: sudo usermod -aG dialout $USER."
             raise ConnectionSetupError(text) from error
         super().__init__(stream, self._device, missing)
 
@@ -260,7 +259,8 @@ class SerialConnection(StreamConnection):
         try:
             port = serial.Serial(path, self._baud, exclusive=True)
         except serial.SerialException as error:
-            raise BlockingIOError(str(error)) if error.errno == errno.EWOULDBLOCK else error from None
+            # The system's error, as its own class: pyserial keeps the number alone.
+            raise error if error.errno is None else OSError(error.errno, os.strerror(error.errno)) from None
         stream = Stream(port, path, BITS_A_BYTE / self._baud)
         device = Path(path).resolve()
         self._links = sorted(link for link in SERIAL_BY_ID.glob("*") if link.resolve() == device)

@@ -29,12 +29,21 @@ pytestmark = pytest.mark.realtime
 PATIENT = ("--set", "companion.link.heartbeat_wait_s=30")
 
 
-def test_nobody_there_is_said_once_and_leaves_no_flight(tmp_path):
+@pytest.mark.parametrize("is_named", [False, True])
+def test_nobody_there_is_said_once_and_leaves_no_flight_but_what_a_person_has(is_named, tmp_path, monkeypatch):
+    # Given a person's file, in a folder that is named or beside those that are not
+    monkeypatch.setattr(run_folder, "RUNS_FOLDER", tmp_path / "runs")
+    monkeypatch.setattr(kept, "RUNS_FOLDER", tmp_path / "runs")
+    (tmp_path / "notes.txt").touch()
+    out = ("--out", tmp_path) if is_named else ()
     quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
-    done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path / "run", *quick)
+    # When nobody is there
+    done = command.run_here("guard", "--connect", "udpin://127.0.0.1:0", *quick, *out)
+    # Then that is said once, and no flight of nobody is left beside the file
     assert done.returncode == 1 and "log in" not in done.stdout
     assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
-    assert not (tmp_path / "run").exists()
+    assert (tmp_path / "notes.txt").exists()
+    assert not list(tmp_path.glob("runs/*"))
 
 
 def test_a_disk_that_is_full_keeps_no_vehicle_from_being_guarded(tmp_path):
