@@ -191,7 +191,7 @@ class CurveProfile:
         spline = _Spline(knots, points)
         steps = int(np.clip(2.0 * chords.sum() / _STEP_M, 50, _MOST_STEPS))
         u = np.linspace(0.0, knots[-1], steps + 1)
-        _, first, _ = spline(u)
+        first = spline.first(u)
         rate = np.maximum(np.linalg.norm(first, axis=1), _LEAST_RATE)
         pieces_m = 0.5 * (rate[1:] + rate[:-1]) * np.diff(u)
         along_m = np.concatenate([[0.0], np.cumsum(pieces_m)])
@@ -209,16 +209,13 @@ class CurveProfile:
         turns = np.pad(np.arccos(cosines) / pieces_m, 1, mode="edge")
         curvature = np.maximum(np.maximum(turns[:-1], turns[1:]), 1e-9)
         turning_m_s2 = min(TURNING_SHARE * self.acceleration_m_s2, self.speeding_up_m_s2)
-        # Lists: one number of an array takes several times as long to look at.
-        squares = (np.minimum(self.speed_m_s, np.sqrt(turning_m_s2 / curvature)) ** 2).tolist()
+        squares = np.minimum(self.speed_m_s, np.sqrt(turning_m_s2 / curvature)) ** 2
         squares[0] = squares[-1] = 0.0
         braking_m_s2 = SPEEDING_SHARE * self.acceleration_m_s2
-        gain = (2.0 * min(braking_m_s2, self.speeding_up_m_s2) * pieces_m).tolist()
-        loss = (2.0 * braking_m_s2 * pieces_m).tolist()
-        for k in range(len(gain)):
-            squares[k + 1] = min(squares[k + 1], squares[k] + gain[k])
-        for k in reversed(range(len(loss))):
-            squares[k] = min(squares[k], squares[k + 1] + loss[k])
+        squares = _slowed(squares, 2.0 * min(braking_m_s2, self.speeding_up_m_s2) * pieces_m)
+        squares = _slowed(squares[::-1], 2.0 * braking_m_s2 * pieces_m[::-1])[::-1]
+        # What rounds to rest in between would take for ever.
+        squares[1:-1] = np.maximum(squares[1:-1], _LEAST_RATE**2)
         return np.asarray(np.sqrt(squares))
 
     def _tabulate(self, spline: "_Spline", u: Floats, along_m: Floats, speeds: Floats, times_s: Floats) -> None:
@@ -236,6 +233,13 @@ class CurveProfile:
         bend = (second - tangent * np.sum(second * tangent, axis=1, keepdims=True)) / rate**2
         acceleration = tangent * change[:, None] + bend * speed[:, None] ** 2
         self._table = np.stack([place, tangent * speed[:, None], acceleration], axis=1)
+
+
+def _slowed(most: Floats, gains: Floats) -> Floats:
+    """The largest values below `most` (n) that grow from one to the next by `gains` (n - 1) at most."""
+    # Less all gains so far, they may not grow: whole arrays, as a loop over a long path takes longer than a setpoint may.
+    grown = np.concatenate([[0.0], np.cumsum(gains)])
+    return grown + np.minimum.accumulate(most - grown)
 
 
 class _Spline:
@@ -257,10 +261,18 @@ class _Spline:
 
     def __call__(self, u: Floats) -> tuple[Floats, Floats, Floats]:
         """Places (m, 3), their first and their second derivatives."""
-        piece = np.clip(np.searchsorted(self._knots, u, side="right") - 1, 0, len(self._knots) - 2)
-        x = (u - self._knots[piece])[:, None]
-        a, b, c, d = self._pieces[:, piece]
+        x, (a, b, c, d) = self._on_piece(u)
         return a + x * (b + x * (c + x * d)), b + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d
+
+    def first(self, u: Floats) -> Floats:
+        """The first derivative alone, as a long path has many places."""
+        x, (_, b, c, d) = self._on_piece(u)
+        return b + x * (2.0 * c + 3.0 * x * d)
+
+    def _on_piece(self, u: Floats) -> tuple[Floats, Floats]:
+        """From where on its piece each is, and that piece's coefficients."""
+        piece = np.clip(np.searchsorted(self._knots, u, side="right") - 1, 0, len(self._knots) - 2)
+        return (u - self._knots[piece])[:, None], self._pieces[:, piece]
 
 
 # Where to be when, from rest to rest: how long the way is, how long it takes, where it ends, and the motion at a time.
