@@ -82,7 +82,7 @@ class GiveBack(GiveAway[GuardContext]):
         self._is_told = False
         self._is_doubted = self.wish == previous  # whether it would hit again
 
-    def _waits(self, guard: GuardContext, inputs: Inputs, now_us: int) -> bool:
+    def _waits(self, guard: GuardContext, now_us: int) -> bool:
         """Whether other setpoints, or sticks, are waited for. Any other mode that would hit again is given up."""
         reason = leads_into(guard, self.wish) if self._is_doubted else None
         if reason is None:
@@ -94,7 +94,7 @@ class GiveBack(GiveAway[GuardContext]):
         autopilot = guard.vehicle.autopilot
         heard_us = guard.others_setpoint_us if self.wish == autopilot.setpoints else guard.sticks_us
         streams = now_us - heard_us < OTHERS_STOPPED_US
-        may_wait = autopilot.mode(self.wish).pilot is not Pilot.AUTOPILOT and inputs.stop_reason is None
+        may_wait = autopilot.mode(self.wish).pilot is not Pilot.AUTOPILOT
         if may_wait and streams and silent_position(guard) is None:
             return True
         self._wishes.pop(0)
@@ -106,7 +106,7 @@ class GiveBack(GiveAway[GuardContext]):
         return self._wishes[0]
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if self._waits(guard, inputs, now_us):
+        if self._waits(guard, now_us):
             return None
         outcome = self._ask_for(self.wish, guard, inputs, now_us)
         if outcome is None:

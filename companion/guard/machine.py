@@ -173,7 +173,8 @@ class GuardCore(Core[GuardContext]):
                 return Transition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
             return Transition(Trigger.REFUSED, inputs.refusal)
-        if (stopped := inputs.stop_reason or guard.fault) and Trigger.STOPPED in TABLE[self.state]:
+        gives_back = self.state is State.GIVING_BACK and guard.is_to_hold
+        if (stopped := inputs.stop_reason or guard.fault) and Trigger.STOPPED in TABLE[self.state] and not gives_back:
             return Transition(Trigger.STOPPED, stopped)
         if self.state not in HOLDING:
             # What was restarted stands, or is being met; what flies has not forgotten what it was asked for.

@@ -86,6 +86,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
     },
     State.GIVING_BACK: {
         **_RELEASED,
+        Trigger.STOPPED: State.GIVING_BACK,
         Trigger.HIT: State.TAKING_OVER,
         Trigger.GIVEN_BACK: State.WATCHING,
     },

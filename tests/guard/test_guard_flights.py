@@ -1,6 +1,7 @@
 """The guard beside a pilot, a mission or a program on another link: whole wire, virtual time."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
@@ -119,6 +120,17 @@ def test_sticks_that_are_heard_no_more_are_not_waited_for():
     air.stop_all()
     air.run_until(lambda: air.state is not State.GIVING_BACK, 3.0)
     assert air.mode == "AUTO.LOITER" and air.told("given_back")
+
+
+@pytest.mark.parametrize("is_fault", [True, False])
+def test_a_fault_or_a_stop_while_it_gives_back_has_the_vehicle_hold(monkeypatch, is_fault):
+    air = pushed_on()
+    if is_fault:
+        monkeypatch.setattr(air.guard.core.handler, "step", Mock(side_effect=ValueError("nobody thought of this")))
+    else:
+        air.guard.stop("stopped")
+    air.run_until(lambda: air.state is State.ENDED, 2.0)
+    assert air.mode == "AUTO.LOITER" and len(air.told("given_back")) == 1
 
 
 # --- whoever takes the vehicle has it

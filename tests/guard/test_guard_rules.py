@@ -17,8 +17,8 @@ from companion.motion.config import SAME_M_S
 def test_while_the_guard_holds_whoever_takes_the_vehicle_has_it_and_every_failure_gives_it_back(state):
     assert TABLE[state].get(Trigger.CONTROL_LOST) is State.STOOD_DOWN
     assert TABLE[state].get(Trigger.DISARMED) is State.STANDING_BY
-    for trigger in (Trigger.STOPPED, Trigger.POSITION_SILENT):
-        assert TABLE[state].get(trigger, state) is State.GIVING_BACK
+    assert TABLE[state].get(Trigger.STOPPED) is State.GIVING_BACK
+    assert TABLE[state].get(Trigger.POSITION_SILENT, state) is State.GIVING_BACK
 
 
 def test_a_crash_is_told_wherever_hits_are_answered_and_ends_with_a_disarm_or_a_take_off():
