@@ -182,6 +182,18 @@ def test_a_step_that_is_late_is_told(tmp_path, late_us, told):
     assert [call.args for call in stepped.note.call_args_list] == [("late", text) for text in told]
 
 
+def test_the_last_words_are_said_where_a_person_ends_the_program_at_once(tmp_path):
+    # Given words that are taken back where a flight ends by itself
+    stepped, heir = Mock(finished=False, next_deadline_us=lambda: 0), Mock()
+    link = Mock(receive=Mock(side_effect=KeyboardInterrupt), now_us=lambda: 0)
+    recorder = FlightRecorder(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        Loop(stepped, link, link, recorder, Console(sys.stderr), Interrupts(), heir=heir).run(Mock())
+    recorder.close()
+    # Then they are said first
+    assert heir.method_calls[0][0] == "leave"
+
+
 IMU, PLACE = (bytes([0xFD, 0, 0, 0, 0, 1, 1, number, 0, 0, 0, 0]) for number in (105, 32))
 
 
