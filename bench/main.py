@@ -9,7 +9,6 @@ from pathlib import Path
 import yaml
 
 from rebound_cli.arguments import add_commands
-from rebound_cli.exit_codes import USAGE
 from rebound_cli.main import run
 
 STUDIES = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf-8"))
@@ -18,10 +17,6 @@ STUDIES = yaml.safe_load(Path(__file__).with_name("studies.yaml").read_text("utf
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one study and return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
-    for gone, instead in STUDIES["gone"].items():
-        if [*words][: len(gone.split())] == gone.split():
-            print(f"bench: `{gone}` is no more: {instead}.", file=sys.stderr)
-            return USAGE
     options = build_parser().parse_args(words)
     options.typed = shlex.join(("python", "-m", "bench", *words))
     return run(options, "bench")
@@ -31,5 +26,5 @@ def build_parser() -> ArgumentParser:
     parser = ArgumentParser(
         prog="python -m bench", description="Studies of Rebound and their tables; needs a checkout and its environment."
     )
-    add_commands(parser, STUDIES["commands"], {}, STUDIES["gone_options"])
+    add_commands(parser, STUDIES["commands"], {})
     return parser

@@ -116,10 +116,8 @@ class _Gone(argparse.Action):
         parser.exit(USAGE, f"{parser.prog}: {self.option_strings[0]} is gone: {self.const}.\n")
 
 
-def add_commands(
-    parser: argparse.ArgumentParser, commands: Table, shared: Table, gone: Table, dest: str = "command"
-) -> None:
-    """Each command of a table, with its function, its options and those that are gone, `gone` of all among them.
+def add_commands(parser: argparse.ArgumentParser, commands: Table, shared: Table, dest: str = "command") -> None:
+    """Each command of a table, with its function, its options and those that are gone.
 
     A function is "module:name", imported when it runs: `--help` and errors in arguments come at once. It returns an
     exit code, or nothing.
@@ -128,7 +126,7 @@ def add_commands(
     for name, told in commands.items():
         command = added.add_parser(name, help=told["does"], description=told["more"])
         if "commands" in told:
-            add_commands(command, told["commands"], shared, gone, "what")
+            add_commands(command, told["commands"], shared, "what")
             continue
         module, _, function = told["run"].partition(":")
         command.set_defaults(run=partial(_run, module, function))
@@ -139,7 +137,7 @@ def add_commands(
             if group not in groups:
                 groups[group] = command.add_mutually_exclusive_group()
             groups[group].add_argument(option, **settings)
-        for option, instead in {**gone, **told.get("gone", {})}.items():
+        for option, instead in told.get("gone", {}).items():
             command.add_argument(option, nargs="?", action=_Gone, const=instead, help=argparse.SUPPRESS)
 
 

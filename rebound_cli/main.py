@@ -98,7 +98,7 @@ def build_parser(command: str = "") -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = _Parser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = TABLE["commands"]
-    add_commands(parser, {command: commands[command]} if command in commands else commands, TABLE["shared"], {})
+    add_commands(parser, {command: commands[command]} if command in commands else commands, TABLE["shared"])
     return parser
 
 

@@ -237,7 +237,7 @@ class CurveProfile:
 
 def _slowed(most: Floats, gains: Floats) -> Floats:
     """The largest values below `most` (n) that grow from one to the next by `gains` (n - 1) at most."""
-    # Less all gains so far, they may not grow: whole arrays, as a loop over a long path takes longer than a setpoint may.
+    # Less all gains so far, they may not grow. In whole arrays: no setpoint is sent meanwhile.
     grown = np.concatenate([[0.0], np.cumsum(gains)])
     return grown + np.minimum.accumulate(most - grown)
 
@@ -267,7 +267,7 @@ class _Spline:
     def first(self, u: Floats) -> Floats:
         """The first derivative alone, as a long path has many places."""
         x, (_, b, c, d) = self._on_piece(u)
-        return b + x * (2.0 * c + 3.0 * x * d)
+        return np.asarray(b + x * (2.0 * c + 3.0 * x * d))
 
     def _on_piece(self, u: Floats) -> tuple[Floats, Floats]:
         """From where on its piece each is, and that piece's coefficients."""

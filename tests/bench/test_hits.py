@@ -1,14 +1,12 @@
-"""Single hits by what the simulator knows: with both laws, alone as in whole flights."""
+"""Single hits by what the simulator knows: with both laws, in whole flights."""
 
 import pytest
 
-from bench.cases.hits import HitCase
 from bench.cases.walls import into_a_wall
 from bench.fly.lockstep import fly
 from bench.rows.contacts import contacts_of
 from bench.rows.recovered import recoveries
 from bench.rows.tables import at_most, at_most_of_groups
-from bench.studies.detection.hits import work_out_flown
 from companion.mission.model import Mission
 from rebound_cli.inputs.inputs import with_guards
 from sim_vehicle.airframe import load_built_in
@@ -43,28 +41,6 @@ def test_a_vehicle_that_the_hit_spins_comes_to_rest_though_lower_and_further_on(
     assert outcome == "completed"
     assert flight["lost_m"] < 0.3
     assert flight["past_m"] < 0.8
-
-
-def judged(case: HitCase) -> dict:
-    return {name: value for name, value in work_out_flown(case).items() if name != "processor_s"}
-
-
-@pytest.mark.parametrize(
-    ("airframe", "speed_m_s"), [("foldable", 1.0), ("foldable", 4.0), ("rigid", 2.0), ("rigid", 3.0)]
-)
-def test_a_hit_alone_is_judged_as_the_hit_of_a_whole_mission(airframe, speed_m_s):
-    # Given a square hit on a wall after a take-off and a way to it
-    outcome, whole = flown_whole(airframe, speed_m_s)
-    # When the same hit is flown alone
-    alone = judged(HitCase(1, airframe, "wall", speed_m_s, imu_hz=250))
-    # Then both were found, neither came back or fell, and both came to rest: by the truth, and by the belief
-    assert outcome == "completed" and alone["found"] and not alone["false"]
-    assert alone["closing_m_s"] == pytest.approx(speed_m_s, abs=0.15)
-    assert alone["again"] == whole["returned"] == 0
-    assert max(alone["lost_m"], whole["lost_m"]) < 0.05
-    # As far from its setpoint as a vehicle that has settled may be (SettledConfig.distance_m).
-    assert whole["past_m"] < 0.1
-    assert 0.3 * whole["settled_s"] < alone["rest_s"] < 1.2 * whole["settled_s"]
 
 
 @pytest.mark.parametrize(("events", "of", "share"), [(0, 300, 0.00994), (1, 300, 0.01572), (0, 0, 1.0), (5, 5, 1.0)])

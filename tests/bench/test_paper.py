@@ -65,19 +65,12 @@ def test_every_flight_states_the_papers_detector_law_and_gain():
         BaselineMission.model_validate(dict(mission))
 
 
-@pytest.fixture(scope="module")
-def sample():
-    return fly(flights.SAMPLE.flights(1)[0])
-
-
-def test_the_sample_scenario_agrees_and_its_picture_marks_the_moments(sample):
+def test_the_sample_scenario_agrees_and_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red():
+    sample = fly(flights.SAMPLE.flights(1)[0])
     findings = flights.SAMPLE.conclude(pd.DataFrame([sample]))
     assert {row["verdict"] for row in findings.rows} == {PASSED}
     names = {text.get_text() for text in findings.pictures["sample_scenario.png"].legends[0].get_texts()}
     assert {"wall", "setpoint sent", "recovery setpoint (eq. 3)", "first contact", "hit detected"} <= names
-
-
-def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     x, (north_m, *beside) = sample["contact_m"][0], sample["setpoint_m"]
     for wrong_m in (north_m - x, 2 * (x - north_m), (x - north_m) / 2):
         moved = sample | {"setpoint_m": [x - wrong_m, *beside]}

@@ -1,4 +1,4 @@
-"""Studies, each flown and judged as stated: the table of faults, ablations, flights by hand and to the ground."""
+"""Studies, each flown and judged as stated: the table of faults, ablations, flights to the ground."""
 
 import math
 import random
@@ -12,7 +12,6 @@ from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.packets import ARM, SET_MODE, made, outside
 from bench.studies.ablation import Rule, flights_table, switched
-from bench.studies.detection.hand import text_of
 from bench.studies.detection.landings import judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
@@ -153,20 +152,6 @@ def test_the_table_counts_what_is_lost_without_a_rule():
     assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
     hand = next(line for line in lines if line.startswith("| hand "))
     assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
-
-
-def test_the_table_counts_what_is_reported_in_the_air_and_not_after_a_touch():
-    # Given an hour at each rate, with one report in the air at 50 Hz and one after a touch at 100 Hz
-    def row(imu_hz, reported):
-        vehicle = {"imu_hz": imu_hz, "mode": "STABILIZED", "seed": 1, "air": "calm"}
-        return {**vehicle, "watched_s": 3600.0, "tilt_deg": [20.0, 35.0, 50.0], "touched": False, "reported": reported}
-
-    in_the_air, after = {"kind": "wall", "since_touch_s": None}, {"kind": "floor", "since_touch_s": 0.1}
-    lines = text_of([row(50, [in_the_air]), row(100, [after]), row(250, [])]).splitlines()
-    # Then the rates' lines show one, none and none
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:5]]
-    assert [(row[0], row[3], row[6]) for row in cells] == [("50", "1", "wall 1"), ("100", "0", ""), ("250", "0", "")]
-    assert sum("seed 1" in line for line in lines) == 1
 
 
 TOUCHED_S = 5.0

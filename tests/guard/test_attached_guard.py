@@ -35,15 +35,10 @@ def holding() -> AttachedFlight:
     return air
 
 
-@pytest.fixture(scope="module")
-def air() -> AttachedFlight:
+def test_while_the_guard_holds_its_own_setpoints_carry_the_vehicle_and_none_of_the_programs_reaches_it():
     air = holding()
     air.run_to(State.WATCHING, 10.0)
     air.run_for(2.0)
-    return air
-
-
-def test_not_one_of_the_programs_setpoints_reaches_the_vehicle_while_the_guard_holds(air):
     taken_s, back_s = (air.event_s("take_over"), air.event_s("given_back"))
     assert back_s - taken_s > 0.5
     assert air.setpoints("program", taken_s + 0.004, back_s + 0.004) == []
@@ -53,30 +48,21 @@ def test_not_one_of_the_programs_setpoints_reaches_the_vehicle_while_the_guard_h
     assert len(air.setpoints("program", back_s + 0.1, back_s + 1.1)) == pytest.approx(20, abs=1)
     # it is given back to hold, where the program's setpoints mean nothing
     assert air.mode == AUTO_LOITER and air.kinds().count("detection") == 1
-
-
-def test_the_guards_own_setpoints_carry_the_vehicle_meanwhile_from_the_hit_on(air):
-    taken_s, back_s = (air.event_s("take_over"), air.event_s("given_back"))
+    # Meanwhile the guard's own fly it: first by attitude, at the IMU's rate, then by place, fifty times a second
     attitudes = air.sent_by("guard", "SET_ATTITUDE_TARGET", taken_s, back_s)
     own = air.setpoints("guard", taken_s, back_s)
-    # First by attitude, at the IMU's rate, then by place, fifty times a second
     assert air.sent_by("guard", "SET_ATTITUDE_TARGET", taken_s, taken_s + 0.005) != []
     leans_s = air.event_s("hand_over") - taken_s
     assert len(attitudes) == pytest.approx(250 * leans_s, rel=0.05)
     assert len(own) == pytest.approx(50 * (back_s - taken_s - leans_s), abs=3)
     assert own[-1].x < 3.7
-
-
-def test_in_the_programs_own_offboard_nothing_is_streamed_beforehand_and_nothing_needs_confirming(air):
-    taken_s = air.event_s("take_over")
+    # In the program's own OFFBOARD nothing was streamed beforehand, and nothing needed confirming
     assert air.setpoints("guard", taken_s - 1.0, taken_s) == []
     # but that PX4 changes its controllers, with the hit to attitudes and with the hand-over to places
     for at_s in (taken_s, air.event_s("hand_over")):
         assert [message.command for message in air.sent_by("guard", "LONG", at_s - 0.1, at_s + 0.1)] == [RUN_CHECKS]
     assert air.event("confirmed").data["after_ms"] == 0.0
-
-
-def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_beside_them(air):
+    # Nor are heartbeats and time questions of the guard's beside the program's own
     sent = {message.get_type() for message in air.sent_by("guard")}
     assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
 

@@ -10,17 +10,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from bench.fly import commanded
-from bench.fly.commanded import (
-    ARM,
-    FACE_NORTH_M,
-    LAND,
-    MANUAL_POSITION,
-    OFFBOARD,
-    REPEATED_EVERY_S,
-    by_places,
-    fly_a_mission,
-    sticks,
-)
+from bench.fly.commanded import ARM, FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, by_places, fly_a_mission, sticks
 from companion.autopilot.px4.firmware import PX4
 from companion.guard.between import BURST_S, Between
 from companion.guard.config import GuardConfig
@@ -200,7 +190,7 @@ def test_a_program_that_steps_from_place_to_place_before_the_wall_is_left_alone(
     air = hit(by_places, then="previous")
     air.stop_all()
     north = [-3.0]
-    air.every(REPEATED_EVERY_S, lambda: air.place(north[0]))
+    air.every(commanded.REPEATED_EVERY_S, lambda: air.place(north[0]))
     air.run_to(State.WATCHING, 10.0)
     air.run_for(8.0)
     taken = len(air.told("take_over"))
@@ -255,7 +245,7 @@ def test_a_program_that_turns_back_and_then_into_the_same_wall_again_is_stopped_
     air = hit(by_places, then="previous")
     air.stop_all()
     north = [2.0]
-    air.every(REPEATED_EVERY_S, lambda: air.place(north[0]))
+    air.every(commanded.REPEATED_EVERY_S, lambda: air.place(north[0]))
     air.run_to(State.WATCHING, 10.0)
     air.run_for(3.0)
     assert air.mode == "OFFBOARD" and air.guard.status().position_ned_m[0] < 2.3
@@ -277,7 +267,7 @@ def test_far_beside_the_touch_a_surface_may_be_nearer_than_its_likely_direction_
     air = hit(by_places, then="previous")
     air.stop_all()
     north = [FACE_NORTH_M - 0.7]
-    air.every(REPEATED_EVERY_S, lambda: air.place(north[0], east_m))
+    air.every(commanded.REPEATED_EVERY_S, lambda: air.place(north[0], east_m))
     air.run_to(State.GIVING_BACK, 10.0)
     air.run_for(2.0)
     # Then it has the vehicle back when it is well in front, and not before

@@ -40,16 +40,10 @@ def mute(air: Air, *message_ids: int) -> None:
     air.guard.step = muted
 
 
-@pytest.fixture(scope="module")
-def hit_in_posctl() -> Air:
-    air = recovering(then="previous")
+def test_a_hit_flown_by_sticks_is_answered_at_once_and_recovered_from_and_the_sticks_are_given_back():
+    air, told = recovering(then="previous"), ("take_over", "confirmed", "recovered", "given_back")
     air.run_to(State.WATCHING, 10.0)
     air.run_for(1.0)
-    return air
-
-
-def test_a_hit_flown_by_sticks_is_recovered_from_and_the_sticks_are_given_back(hit_in_posctl):
-    air, told = hit_in_posctl, ("take_over", "confirmed", "recovered", "given_back")
     assert tuple(kind for kind in air.kinds() if kind in told) == told
     assert air.mode == "POSCTL"
     # measured in virtual time: command, PX4's two answers, CURRENT_MODE; setpoints have led
@@ -58,12 +52,10 @@ def test_a_hit_flown_by_sticks_is_recovered_from_and_the_sticks_are_given_back(h
     aimed = [event.data["recovery_setpoint_ned_m"] for event in air.events if "recovery_setpoint_ned_m" in event.data]
     assert aimed[-1][0] < FACE_NORTH_M - CLEAR_M
     assert air.event("recovered").data["settled_after_s"] <= 4.0
-
-
-def test_the_first_recovery_setpoint_and_the_mode_leave_with_the_datagram_that_shows_the_hit(hit_in_posctl):
-    hit_s = hit_in_posctl.event_s("detection")
-    # the vehicle's next interval is the first that can hear them
-    sent = {m.get_type() for m in hit_in_posctl.sent_by("guard", "", hit_s - 0.001, hit_s + 0.001)}
+    # The first recovery setpoint and the mode left with the datagram that shows the hit: the vehicle's next interval is
+    # the first that can hear them
+    hit_s = air.event_s("detection")
+    sent = {m.get_type() for m in air.sent_by("guard", "", hit_s - 0.001, hit_s + 0.001)}
     assert sent >= {"SET_ATTITUDE_TARGET", "COMMAND_LONG"}
 
 
@@ -122,15 +114,18 @@ def test_sticks_that_are_heard_no_more_are_not_waited_for():
     assert air.mode == "AUTO.LOITER" and air.told("given_back")
 
 
-@pytest.mark.parametrize("is_fault", [True, False])
-def test_a_fault_or_a_stop_while_it_gives_back_has_the_vehicle_hold(monkeypatch, is_fault):
-    air = pushed_on()
+@pytest.mark.parametrize(("gives_back", "is_fault"), [(True, True), (True, False), (False, False)])
+def test_a_fault_or_a_stop_while_it_recovers_or_gives_back_has_the_vehicle_hold(monkeypatch, gives_back, is_fault):
+    air = pushed_on() if gives_back else recovering(then="previous")
+    # In AUTO.LOITER PX4 would take the moving stick for a pilot's wish.
+    air.run_for(0.7)
     if is_fault:
         monkeypatch.setattr(air.guard.core.handler, "step", Mock(side_effect=ValueError("nobody thought of this")))
     else:
-        air.guard.stop("stopped")
-    air.run_until(lambda: air.state is State.ENDED, 2.0)
+        air.guard.stop("stopped with Ctrl-C")
+    air.run_until(lambda: air.guard.finished, 2.0)
     assert air.mode == "AUTO.LOITER" and len(air.told("given_back")) == 1
+    assert ("nobody thought of this" if is_fault else "stopped with Ctrl-C") in air.guard.core.flight.reason
 
 
 # --- whoever takes the vehicle has it
@@ -199,15 +194,6 @@ def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
     air.pushed_into_the_wall()
     air.run_to(State.WATCHING, 5.0)
     assert "OFFBOARD" in air.told("refused")[0] and air.mode == "AUTO.LOITER"
-
-
-def test_told_to_stop_while_it_holds_it_gives_the_vehicle_to_hold_first():
-    air = recovering(then="previous")
-    # In AUTO.LOITER PX4 would take the moving stick for a pilot's wish.
-    air.run_for(0.7)
-    air.guard.stop("stopped with Ctrl-C")
-    air.run_until(lambda: air.guard.finished, 2.0)
-    assert (air.mode, air.guard.core.flight.reason) == ("AUTO.LOITER", "stopped with Ctrl-C")
 
 
 def test_a_position_that_ends_while_the_guard_holds_has_the_vehicle_given_back_to_hold():

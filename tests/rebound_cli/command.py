@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
-from tests.clients.simulator import free_port, wait_until
+from tests.clients.simulator import wait_until
 
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"
@@ -43,19 +43,6 @@ def run_here(*arguments):
             for number, handler in handlers:
                 signal.signal(number, handler)
     return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
-
-
-@contextlib.contextmanager
-def vehicle_on_air(*options):
-    """A simulated vehicle of its own; the port at which it expects its companion."""
-    port = free_port()
-    vehicle = start("sim", "--port", "0", "--remote", f"127.0.0.1:{port}", *options)
-    vehicle.stdout.readline()
-    try:
-        yield port
-    finally:
-        vehicle.terminate()
-        vehicle.communicate(timeout=20)
 
 
 def events_of(folder):

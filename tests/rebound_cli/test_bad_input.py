@@ -67,7 +67,7 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("fly", WALL, "--lockstep", "--airframe", "foldible"), ("foldible", "did you mean foldable?")),
         (("fly", WALL, "--lockstep", "--airframe", "racer.yaml"), ("racer.yaml: no such file; did you mean racer?",)),
         (("fly", WALL, "--lockstep", "--companion", SQUARE), (f"{SQUARE}: has no companion: part",)),
-        (("preflight", "--connect", "udpin://127.0.0.1:0", "--companion", SQUARE), (f"{SQUARE}: has no companion: part",)),
+        (("preflight", "--connect", "udpin://:1", "--companion", SQUARE), (f"{SQUARE}: has no companion: part",)),
         (("fly", WALL, "--lockstep", "--airframe", SQUARE), (f"{SQUARE}:1: add based_on with one of foldable, hexa",)),
         (
             ("fly", WALL, "--lockstep", "--set", "sim.faults=[{kind: gusts}]"),

@@ -104,10 +104,10 @@ def collision(at_s=10.004, setpoint=(1.5, 0.0, -2.08), settled_s=1.0):
     )
 
 
-def report(*collisions, outcome="completed", reason="landed and disarmed"):
+def report(*collisions, outcome="completed"):
     return FlightReport(
         outcome=outcome,
-        reason=reason,
+        reason="landed and disarmed",
         autopilot="PX4",
         stream_rates_hz={},
         collisions=collisions,
@@ -118,16 +118,8 @@ def report(*collisions, outcome="completed", reason="landed and disarmed"):
     )
 
 
-def flight(
-    events=None,
-    series=None,
-    hits=(),
-    collisions=(),
-    outcome="completed",
-    reason="landed and disarmed",
-    **mission_changes,
-):
-    told = report(*collisions, outcome=outcome, reason=reason)
+def flight(events=None, series=None, hits=(), collisions=(), outcome="completed", **mission_changes):
+    told = report(*collisions, outcome=outcome)
     truth = FlightTruth(tuple(hits), series or plain_path(), EPOCH_US)
     events = tuple(plain_events() if events is None else events)
     return JudgedFlight(mission(**mission_changes), told, events, truth, room(), load_built_in("foldable"))

@@ -111,7 +111,7 @@ def test_an_abort_is_a_failure_unless_the_policy_asked_for_it():
     aborts = [event(12, "aborted")]
     asked = {"then": "hold", "max_hits": 1, "after_max_hits": "abort"}
     assert causes(bounced(*aborts, policy=asked, outcome="aborted")) == []
-    assert causes(bounced(*aborts, outcome="aborted", reason="not arrived")) == ["not as the mission says"]
+    assert causes(bounced(*aborts, outcome="aborted")) == ["not as the mission says"]
     assert causes(bounced(*aborts, policy=asked, outcome="failed")) == ["not as the mission says"]
 
 

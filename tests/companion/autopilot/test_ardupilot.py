@@ -24,14 +24,7 @@ from companion.link.vehicle import Identity, Vehicle
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.moves import would_move
-from companion.messages import (
-    AttitudeSetpoint,
-    AttitudeTarget,
-    Parameter,
-    PositionSetpoint,
-    Refused,
-    SendCommand,
-)
+from companion.messages import AttitudeSetpoint, AttitudeTarget, Parameter, PositionSetpoint, Refused, SendCommand
 from companion.reflex.config import EstimateConfig
 from rebound_cli.live.console import Console
 from rebound_cli.preflight.command import show

@@ -137,18 +137,11 @@ FORWARD, HOVER = (2.0, 0.0, 0.0), (0.0, 0.05, 0.0)
 
 
 def kind(
-    force,
-    velocity=FORWARD,
-    tilt_deg=0.0,
-    height_m=5.0,
-    descends=False,
-    by_hand=False,
-    has_climbed=True,
-    sinking_m_s=None,
+    force, velocity=FORWARD, tilt_deg=0.0, height_m=5.0, descends=False, by_hand=False, has_climbed=True, sinks_m_s=None
 ):
     situation = Situation(may_crash=True, height_m=height_m, descent_commanded=descends, flown_by_hand=by_hand)
     tilted = (math.cos(math.radians(tilt_deg / 2.0)), math.sin(math.radians(tilt_deg / 2.0)), 0.0, 0.0)
-    return Touch(force, velocity, tilted, situation._replace(has_climbed=has_climbed), sinking_m_s).kind
+    return Touch(force, velocity, tilted, situation._replace(has_climbed=has_climbed), sinks_m_s).kind
 
 
 def sinking(speed_m_s):
@@ -194,8 +187,8 @@ def test_what_has_not_climbed_since_it_stood_on_the_ground_cannot_have_fallen():
     assert kind(UP, **gone_astray, has_climbed=False) is ImpactKind.LANDING
     assert kind(UP, **gone_astray, has_climbed=False, tilt_deg=60.0) is ImpactKind.CRASH
     # What falls loses height by the reported heights, too
-    assert kind(UP, **gone_astray, sinking_m_s=0.5) is ImpactKind.LANDING
-    assert kind(UP, **gone_astray, sinking_m_s=4.0) is ImpactKind.CRASH
+    assert kind(UP, **gone_astray, sinks_m_s=0.5) is ImpactKind.LANDING
+    assert kind(UP, **gone_astray, sinks_m_s=4.0) is ImpactKind.CRASH
 
 
 def test_a_wall_met_at_a_steep_tilt_high_up_is_no_crash():

@@ -16,7 +16,6 @@ from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, UNCORR
 from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
-NORTH = (1.0, 0.0, 0.0)
 ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 # A real PX4's, and others: after how long what was hidden is put right, with which frequency and damping.
 PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)

@@ -14,18 +14,9 @@ from companion.flight.obstacle_map import FlightRoom
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
+from companion.reflex import config as set_to
 from companion.reflex.belief.motion_estimator import Belief
-from companion.reflex.config import (
-    LEAD_S,
-    LEAST_THRUST,
-    MOST_CLIMB_M_S2,
-    MOST_HELD_S,
-    MOST_TILT_RAD,
-    NOTICED_S,
-    PRESSES_M_S2,
-    WAY_S,
-    RecoveryConfig,
-)
+from companion.reflex.config import LEAST_THRUST, MOST_CLIMB_M_S2, MOST_TILT_RAD, RecoveryConfig
 from companion.reflex.recovery.attitude_law import Lean, attitude_and_thrust, held_off, tilted, wanted
 from companion.reflex.recovery.laws import RECOVERY_LAWS
 from companion.reflex.surface import Contact, Surface, projected
@@ -84,7 +75,7 @@ def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
     assert soft[2] == AT[2], "height is held"
     # a stiff airframe that needs more room to stop gets it
     stiff = goal_of("adaptive", touched, touched.rebound(0.9))
-    assert off_m(touched, stiff) == pytest.approx(max(0.35, 0.9 * speed * WAY_S))
+    assert off_m(touched, stiff) == pytest.approx(max(0.35, 0.9 * speed * set_to.WAY_S))
 
 
 @pytest.mark.parametrize("name", ["adaptive", "normal"])
@@ -132,7 +123,7 @@ FAR = Surface((5.0, 0.0, -2.0), SOUTH, 0.35)
 
 
 def lean(belief, surfaces=(), full_m_s2=FULL_M_S2) -> Lean:
-    return Lean(belief, surfaces, full_m_s2, MOST_HELD_S + NOTICED_S)
+    return Lean(belief, surfaces, full_m_s2, set_to.MOST_HELD_S + set_to.NOTICED_S)
 
 
 def up_of(attitude_wxyz):
@@ -195,7 +186,7 @@ def test_what_is_held_is_safe_by_what_is_certain_of_the_speed_away_from_a_surfac
 
 @pytest.mark.parametrize(
     ("off_m", "velocity_m_s", "presses_m_s2"),
-    [(0.0, -0.3, PRESSES_M_S2), (0.2, 0.0, math.inf), (0.0, -2.5, math.inf)],
+    [(0.0, -0.3, set_to.PRESSES_M_S2), (0.2, 0.0, math.inf), (0.0, -2.5, math.inf)],
     ids=["turned onto it", "not at it", "follows it"],
 )
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, velocity_m_s, presses_m_s2):
@@ -249,7 +240,7 @@ def test_a_vehicle_that_turns_leans_by_what_px4_leaves_of_its_thrust_for_the_tur
 
 
 def test_a_vehicle_that_turns_by_two_radians_within_its_attitudes_lag_leans_half_as_much():
-    belief = Belief(HERE, ZERO, yaw_rate_rad_s=-2.0 / LEAD_S)
+    belief = Belief(HERE, ZERO, yaw_rate_rad_s=-2.0 / set_to.LEAD_S)
     attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=30.0))
     n, _, d = up_of(attitude)
     assert n / -d == pytest.approx(0.5 * math.tan(MOST_TILT_RAD))

@@ -19,9 +19,9 @@ from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
 from sim_vehicle.testing import start_vehicle
-from tests.clients.simulator import free_port
+from tests.clients.simulator import free_port, simulator
 from tests.rebound_cli import command
-from tests.rebound_cli.command import assert_comes_again, events_of, guarding, taken_off, vehicle_on_air, wait_for_event
+from tests.rebound_cli.command import assert_comes_again, events_of, guarding, taken_off, wait_for_event
 from tests.rebound_cli.live.cable import Cable
 
 pytestmark = pytest.mark.realtime
@@ -61,8 +61,8 @@ def test_a_disk_that_is_full_keeps_no_vehicle_from_being_guarded(tmp_path):
 def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path / "run"))
     with (
-        vehicle_on_air() as port,
-        guarding(f"udpin://127.0.0.1:{port}", tmp_path, *PATIENT, "--then", "previous") as guard,
+        simulator() as vehicle,
+        guarding(f"udpin://127.0.0.1:{vehicle.companion_port}", tmp_path, *PATIENT, "--then", "previous") as guard,
     ):
         wait_for_event(tmp_path, "standing_by")
         status = ask(tmp_path / "run" / "status.sock")
@@ -81,7 +81,7 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
 def test_as_the_link_it_passes_what_a_client_asks_and_is_repeated_to_the_bit(tmp_path):
     between = free_port()
     link = ("--between", f"udpin://127.0.0.1:{between}")
-    with vehicle_on_air() as port, guarding(f"udpin://127.0.0.1:{port}", tmp_path, *PATIENT, *link):
+    with simulator() as on, guarding(f"udpin://127.0.0.1:{on.companion_port}", tmp_path, *PATIENT, *link):
         client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{between}", source_system=254)
         wait_for_event(tmp_path, "standing_by")
         # A client that asks for a slow stream, which the guard needs fast, for a parameter, and sends a setpoint

@@ -147,7 +147,12 @@ def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
     # Given a disk that has stopped, one write that will fail, and fifty too many
     done, began, going_on = [], threading.Event(), threading.Event()
     writer = Background("log")
-    writer.give(lambda: (began.set(), going_on.wait()))
+
+    def stand():
+        began.set()
+        going_on.wait()
+
+    writer.give(stand)
     began.wait()
     writer.give(BREAKS)
     for number in range(MOST_WAITING + 49):

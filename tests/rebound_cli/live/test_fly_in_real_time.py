@@ -13,6 +13,7 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.json.parameters import as_parameter_file
+from tests.clients.simulator import simulator
 from tests.rebound_cli import command
 from tests.rebound_cli.command import SQUARE, WALL, assert_comes_again, run_here, start, wait_for_event
 from tests.sim_vehicle.hil.test_hil_tcp import Px4Client
@@ -69,9 +70,9 @@ def test_a_yes_flies_the_plan_of_a_vehicle_without_truth_and_ctrl_c_ends_it(tmp_
     # Given a vehicle and a companion with one key
     folder, key = tmp_path / "run", tmp_path / "key"
     assert run_here("key", "new", key).returncode == 0
-    with command.vehicle_on_air("--signing-key", key) as port:
-        words = ("fly", SQUARE, *command.HOP, "--connect", f"udpin://127.0.0.1:{port}", "--signing-key", key)
-        process = start(*words, "--json", "--out", folder, stdin=subprocess.PIPE)
+    with simulator("--signing-key", key) as vehicle:
+        words = ("fly", SQUARE, *command.HOP, "--connect", f"udpin://127.0.0.1:{vehicle.companion_port}")
+        process = start(*words, "--signing-key", key, "--json", "--out", folder, stdin=subprocess.PIPE)
         wait_for_event(folder, "plan")
         process.stdin.write("y\n")
         process.stdin.flush()

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.clients.simulator import simulator
 from tests.rebound_cli.command import taken_off
 from tests.rebound_cli.live.cable import Cable
 
@@ -223,15 +224,9 @@ def test_ready_at_the_first_heartbeat_on_the_one_device_that_it_may_open(tmp_pat
         sandbox.wait_for(lambda: "none heard yet" in sandbox.shown("StatusText"))
         assert sandbox.shown("ActiveState") == "activating"
         # When the vehicle starts
-        simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", "127.0.0.1:9"]
-        link = ["--link", cable.vehicle_url, "--stop-with-stdin"]
-        vehicle = subprocess.Popen([*simulator, *link], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
-        try:
+        with simulator("--link", cable.vehicle_url):
             # Then the service is ready, and sees it over that device alone: no network, no other
             sandbox.wait_for(lambda: is_in(sandbox, "standing by"))
-        finally:
-            vehicle.stdin.close()
-            vehicle.wait(20)
         assert sandbox.shown("PrivateNetwork") == "yes"
         # Its clock is ProtectClock's, to be read.
         assert sandbox.shown("DeviceAllow").splitlines() == ["char-rtc r", f"{ours} rw"]

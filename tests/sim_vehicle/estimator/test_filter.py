@@ -165,13 +165,6 @@ def test_a_filter_without_the_sensors_it_needs_is_refused(missing):
     filtered(changes={"sensors": {missing: {"fitted": False}, "motion_capture": {"fitted": True}}})
 
 
-@pytest.fixture(scope="module")
-def hover():
-    flight = Flight(filtered())
-    flight.climb()
-    return flight, flight.fly(HOVER, 30.0)
-
-
 # Of 1000 runs of a consistent filter so many lie within.
 NEARLY_ALWAYS = 0.999
 
@@ -209,8 +202,12 @@ def test_innovations_are_as_large_as_the_filter_says():
         assert rejected <= 0.01 * freedom, sensor
 
 
-def test_position_by_flow_drifts_and_by_cameras_does_not(hover):
-    flight, _ = hover
+def test_position_by_flow_drifts_and_by_cameras_does_not_and_the_gyroscopes_bias_is_found():
+    flight = Flight(filtered())
+    flight.climb()
+    flight.fly(HOVER, 30.0)
+    true = flight.plant.constants.gyroscope_bias_frd_rad_s
+    assert flight.plant.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
     drift_m = float(np.hypot(*flight.position_error_m[:2]))
     assert 0.02 < drift_m < 1.0
     assert abs(flight.position_error_m[2]) < 0.05
@@ -220,12 +217,6 @@ def test_position_by_flow_drifts_and_by_cameras_does_not(hover):
     assert np.linalg.norm(seen.position_error_m) < 0.01
     # and so is the velocity: root of the mean squared error on one axis, of the horizontal two
     assert np.sqrt(np.mean(errors[:, :2] ** 2)) < 0.015
-
-
-def test_the_filter_finds_the_gyroscopes_bias(hover):
-    flight, _ = hover
-    true = flight.plant.constants.gyroscope_bias_frd_rad_s
-    assert flight.plant.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
 
 
 def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():

@@ -141,24 +141,19 @@ def test_the_world_lies_where_the_parameters_say():
     assert pole.latitude_deg == pytest.approx(90.0) and abs(pole.longitude_deg) <= 180.0
 
 
-@pytest.fixture(scope="module")
-def circling() -> Client:
-    """Ahead at 2 m/s in OFFBOARD, and to the left by a third of a radian a second."""
-    client = Client(system=255, component=190)
-    client.take_off(8.0)
+def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message():
+    # Given a vehicle that flies ahead at 2 m/s in OFFBOARD, and to the left by a third of a radian a second
+    circling = Client(system=255, component=190)
+    circling.take_off(8.0)
 
     def ask() -> None:
         fields = (0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1 / 3)
-        client.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 0x5C7, *fields))
+        circling.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 0x5C7, *fields))
 
-    client.run(0.2, ask)
-    client.command(SET_MODE, 1, 6)
-    client.run(20.0, ask)
-    return client
-
-
-def test_where_a_vehicle_is_how_it_moves_and_turns_is_so_in_every_message(circling):
-    # Given a vehicle on its way round a circle, and the truth at each message
+    circling.run(0.2, ask)
+    circling.command(SET_MODE, 1, 6)
+    circling.run(20.0, ask)
+    # Then the truth is in each message
     x, y, z, vx, vy, vz, qw, qx, qy, qz, p, q, r = circling.vehicle.state.body
     for kind in ("LOCAL_POSITION_NED", "ODOMETRY"):
         told = circling.last(kind)
