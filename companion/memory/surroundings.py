@@ -166,12 +166,16 @@ def route(known: ObstacleMap, start_ned_m: Vector3, goal_ned_m: Vector3) -> tupl
 
 def _search(known: ObstacleMap, start: Place, goal: Place) -> list[Place] | None:
     """The shortest way over the corners of what is known and of the fence (A*), from the start to the goal."""
-    fence, inner = known.fence, known.grown(known.clearance_m - ROUNDING_M)
+    fence = known.fence
     if known.holds(goal) or fence.outside_by_m((*goal, 0.0)) > ROUNDING_M:
         return None
     # Between two places in a circle the way is inside too.
     corners_ne_m = fence.polygon_ne_m
     polygon = None if corners_ne_m is None else Polygon(corners_ne_m).buffer(FENCE_SLACK_M, join_style="mitre")
+    straight = LineString((start, goal))
+    if (polygon is None or polygon.covers(straight)) and known.keeps_off(straight, (start, goal)):
+        return [start, goal]
+    inner = known.grown(known.clearance_m - ROUNDING_M)
     shapely.prepare([polygon, inner])
     around = map(tuple, shapely.get_coordinates(known.grown(known.clearance_m)).tolist())
     corners = filter(lambda corner: fence.contains(*corner), dict.fromkeys([*around, *(corners_ne_m or ())]))
