@@ -8,7 +8,7 @@ import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 
 import numpy as np
@@ -129,6 +129,7 @@ class ObstacleMap:
 THICKNESS_M = 0.1
 
 
+@lru_cache(maxsize=512)  # a path looks at the same patches for each of its points
 def assumed_area(patch: Patch, error_rad: float) -> BaseGeometry:
     """The area in plan that the surface is assumed to cover, whatever its heights.
 
