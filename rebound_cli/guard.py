@@ -45,7 +45,9 @@ def run_guard(options: Namespace) -> None:
         manager = service_manager()
         with closing(connection), Interrupts() as interrupts:
             while not (outcome := _recorded(config, options.out, connection, console, interrupts, manager, between)):
-                pass
+                # One that has met its vehicle goes on waiting for it.
+                link = config.companion.link.model_copy(update={"wait": True})
+                config = config.model_copy(update={"companion": config.companion.model_copy(update={"link": link})})
         if interrupts.reason is None:
             text = outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else ".")
             raise ReboundError(text + unheard_text(connection))
@@ -68,6 +70,7 @@ def _recorded(
         run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
     guard, kept_out = Guard(config), 0 if between is None else between.kept_out
+    end = "cut off"
     try:
         with (
             served(console.print, command="guard", folder=str(folder.resolve())) as server,
@@ -86,12 +89,13 @@ def _recorded(
             loop.run(
                 beside, lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None
             )
+            end = "goes on in the next folder"
     finally:
         recorder.close()
         core, flight = guard.core, guard.core.flight
         outcome, hits = flight.reason, [asdict(collision) for collision in core.collisions()]
         summary = {
-            "outcome": outcome or "goes on in the next folder",
+            "outcome": outcome or end,
             "collisions": hits,
             "left_alone": flight.left_alone,
             "crashed": flight.crashed or None,

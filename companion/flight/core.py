@@ -154,7 +154,8 @@ class Core(ABC, Generic[FlightT]):
         if self.resets.shift_ned_m != before:
             jump_m = math.dist(self.resets.shift_ned_m, before)
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
-            self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
+            shift_ned_m = self.resets.shift_ned_m
+            self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3), shift_ned_m=shift_ned_m)
         return samples
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> str | None:

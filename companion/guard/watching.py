@@ -20,6 +20,7 @@ from companion.messages import (
     set_message_interval,
 )
 from companion.motion.config import SAME_M_S
+from companion.motion.settling import Lasting
 from companion.reflex.detection.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
@@ -29,6 +30,9 @@ STICKS_HZ = 20.0
 THROTTLE = 2
 # MAVSDK repeats its setpoint at 20 Hz, others at 2 Hz at least: after this somebody has stopped.
 OTHERS_STOPPED_US = 1_000_000
+# OFFBOARD that lasts so long has a sender elsewhere: PX4 holds the guard's own last setpoint for a second, by default,
+# and notices late.
+OTHERS_STREAM_US = 2 * OTHERS_STOPPED_US
 # A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
 STREAMS_GONE_US = 3_000_000
 
@@ -144,6 +148,9 @@ class StandBy(Handler[GuardContext]):
 class Watching(Handler[GuardContext]):
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
+    def __init__(self, guard: GuardContext, now_us: int) -> None:
+        self._streamed = Lasting()  # in OFFBOARD, in which the guard sends none
+
     def target(self, guard: GuardContext, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         streams_elsewhere = guard.program_elsewhere or now_us - guard.others_setpoint_us < OTHERS_STOPPED_US
@@ -153,6 +160,7 @@ class Watching(Handler[GuardContext]):
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
         # Where the mode needs no stream, one that has left it may have been sent somewhere once.
         streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
-        guard.program_elsewhere |= streams and not guard.keeps_others_out
+        self._streamed.update(streams, now_us)
+        guard.program_elsewhere |= self._streamed.lasts_us > OTHERS_STREAM_US and not guard.keeps_others_out
         reason = why_not(guard)
         return None if reason is None else Transition(Trigger.NOT_TO_GUARD)

@@ -84,7 +84,8 @@ class Vehicle:
     landed_us: int = 0  # when it began to say so
     attitude: messages.Attitude | None = None
     thrust_fraction: float | None = None  # as last commanded
-    battery_percent: int | None = None
+    battery_percent: int | None = None  # the higher of the last two reports
+    battery_told: int | None = None  # the newest
     said: str = ""  # its newest warning, since it was asked to arm
     history: MotionHistory = field(default_factory=MotionHistory)
     last_received_us: int = 0
@@ -137,7 +138,9 @@ class Vehicle:
                     self.is_disarm_unexplained = False
                     self.conflicts += 1
             case messages.Battery():
-                self.battery_percent = sample.remaining_percent
+                # One forged or broken report ends no flight.
+                self.battery_percent = max(sample.remaining_percent, self.battery_told or 0)
+                self.battery_told = sample.remaining_percent
             case messages.AutopilotVersion():
                 self.version = sample.flight_version
 

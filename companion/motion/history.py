@@ -4,7 +4,21 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition
-from companion.motion.config import KEPT_US
+from companion.motion.config import KEPT_US, LONGEST_GAP_US
+
+
+@dataclass(slots=True)
+class Lateness:
+    """Whether a sample comes behind a newer one. Where all do for a while, that one's stamp was wrong."""
+
+    since_us: int | None = None  # by the vehicle's clock, since when all have come late
+
+    def is_late(self, time_boot_us: int, newest_boot_us: int) -> bool:
+        if not 0 <= newest_boot_us - time_boot_us < KEPT_US:
+            self.since_us = None
+            return False
+        since_us = self.since_us = time_boot_us if self.since_us is None else self.since_us
+        return time_boot_us - since_us < LONGEST_GAP_US
 
 
 @dataclass(slots=True)
@@ -13,14 +27,14 @@ class MotionHistory:
 
     latest: LocalPosition | None = None
     _samples: deque[LocalPosition] = field(default_factory=deque)
+    _lateness: Lateness = field(default_factory=Lateness)
 
     def add(self, sample: LocalPosition) -> bool:
         """Remember a sample; False when it is older than what is known and was dropped."""
-        samples, time_us = self._samples, sample.time_boot_us
-        late_us = -1 if self.latest is None else self.latest.time_boot_us - time_us
-        if 0 <= late_us < KEPT_US:
+        samples, time_us, latest = self._samples, sample.time_boot_us, self.latest
+        if latest is not None and self._lateness.is_late(time_us, latest.time_boot_us):
             return False
-        if late_us >= KEPT_US:
+        if latest is not None and time_us <= latest.time_boot_us:
             samples.clear()
         self.latest = sample
         samples.append(sample)

@@ -11,7 +11,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from companion.messages import AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample, Vector3
-from companion.motion.config import KEPT_US, SettledConfig
+from companion.motion.config import KEPT_US, LONGEST_GAP_US, SettledConfig
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import ZERO, plus
 from companion.reflex import config as numbers
@@ -232,6 +232,11 @@ class Reflex:
     def in_one_recovery(self) -> list[Collision]:
         """The last hits, the newest first, without a recovery in between."""
         return list(takewhile(lambda record: not record.is_over, reversed(self.hits)))
+
+    def is_without_imu(self, now_us: int) -> bool:
+        """Whether no sample has come for longer than the belief is carried on without one."""
+        arrivals_us = self.monitor.stream_health.arrivals_us
+        return bool(arrivals_us) and now_us - arrivals_us[-1] > LONGEST_GAP_US
 
     @property
     def sample_boot_us(self) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import ConfigurationError
+from companion.motion.vector import ZERO, plus
 from rebound_cli.inputs import documents
 from rebound_cli.inputs.documents import Document, DocumentError, DocumentPath, load_document, validated
 from rebound_cli.inputs.shipped import shipped_missions
@@ -193,10 +194,13 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
     if armed is None or item is None:
         raise ConfigurationError(f"{run} ended before its first item: fly it from the start.")
     with reading(run / run_folder.EVENTS_NAME):
+        # In the vehicle's frame, which has moved by the resets of its estimator since.
+        since = events[events.index(armed) :]
+        shifts = [each["data"]["shift_ned_m"] for each in since if "shift_ned_m" in each["data"]]
         at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
         return {
             "at_step": max(1, at_step),
-            "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
+            "origin_ned_m": plus(armed["data"]["origin_ned_m"], 1.0, shifts[-1] if shifts else ZERO),
             "armed_at_us": armed["time_us"],
             "armed_boot_us": armed["data"]["time_boot_us"],
             "hits": sum(HIT_KINDS.get(each["kind"], 0) for each in events) + (flown.resume.hits if flown.resume else 0),

@@ -43,10 +43,11 @@ class Heir:
         ways = [(later_s, way) for later_s, word in words if (way := connection.way(word)) is not None]
         if not ways and not self._has_words:
             return
-        self._has_words = bool(ways)
         said = json.dumps([[later_s, way.packet.hex(), way.address] for later_s, way in ways]).encode()
         with suppress(OSError):
+            # Of what could not be sent the next step tries again: words that are taken back have to be.
             socket.send_fds(self._channel, [said], [way.descriptor for _, way in ways[:1]])
+            self._has_words = bool(ways)
 
     def close(self) -> None:
         """The companion ends by itself: there is no word."""

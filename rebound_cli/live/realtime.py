@@ -3,6 +3,7 @@
 import contextlib
 import os
 import select
+import termios
 import traceback
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -65,6 +66,9 @@ class AskPerson:
             self._is_asked = self._console.live_is_held = False
             return
         if not self._is_asked:
+            # What was typed before the plan is shown says nothing of it; a pipe's first line is an answer on purpose.
+            with contextlib.suppress(termios.error):
+                termios.tcflush(self._stdin, termios.TCIFLUSH)
             if self._is_asked_again:
                 self._read_answer()
                 self._typed = b""

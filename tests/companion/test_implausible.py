@@ -99,7 +99,8 @@ def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit
     # Then it stays where it is, which it now calls 3 m further north, and the mission goes on
     assert f.vehicle.position == pytest.approx([before_m[0] + 3.0, *before_m[1:]], abs=0.02)
     assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0] + 3.0, abs=0.02)
-    assert f.event("estimate").data["jump_m"] == pytest.approx(3.0, abs=0.01)
+    told = f.event("estimate").data
+    assert (told["jump_m"], told["shift_ned_m"][0]) == pytest.approx((3.0, 3.0), abs=0.01)
     assert f.companion.status().position_ned_m == pytest.approx(before_m, abs=0.02) and f.state == "mission"
 
 

@@ -257,6 +257,18 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.guard.core.flight.left_alone == len(air.told("left_alone"))
 
 
+def test_a_glance_of_offboard_leaves_a_pilot_guarded():
+    air = Air()
+    air.flown_by_sticks()
+    air.run_for(1.0)
+    air.set_mode(OFFBOARD)
+    air.run_for(0.4)
+    air.set_mode(MANUAL_POSITION)
+    air.run_for(2.0)
+    air.forward = 0.3
+    air.run_to(State.TAKING_OVER, 20.0)
+
+
 def test_a_program_that_begins_to_send_setpoints_in_a_recovery_does_not_end_it():
     air = recovering()
     # When it asks for a way along the wall, on a link of its own

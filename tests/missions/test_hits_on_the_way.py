@@ -80,7 +80,7 @@ def test_a_velocity_that_a_known_wall_holds_back_does_not_catch_up(east_m_s, wid
 @pytest.mark.parametrize("policy", ["hold", pytest.param("return", marks=pytest.mark.slow)])
 def test_a_hit_in_the_descent_is_recovered_from_and_the_landing_goes_on(policy):
     # Given a landing from 2.5 m, when a wall that comes from the north strikes the vehicle, and stops where it did
-    comes = {"velocity_ned_m_s": [-1.2, 0, 0], "from_s": 9.5, "until_s": 11.1}
+    comes = {"velocity_ned_m_s": [-1.2, 0, 0], "from_s": 9.9, "until_s": 11.5}
     flight = in_room(height_m=2.5, then=policy, walls=[wall(2.0, motion=comes)])
     hit, collision = flight.hits[0], flight.report.collisions[0]
     assert 0.8 < -hit.contact_position_ned_m[2] < 2.4, "on the way down"
@@ -105,3 +105,17 @@ def test_a_brake_of_a_throw_that_nobody_ends_makes_no_fall(kept_s):
     velocity = flight.series["velocity_ned_m_s"][flight.series["time_boot_us"] >= killed_at_us]
     # Then its velocity loop ends it at 8 m/s^2 over MPC_Z_VEL_P_ACC, 4 1/s, and what it sank with; not at 5 m/s
     assert velocity[:, 2].max() < 2.8
+
+
+@pytest.mark.parametrize("lost", ["HIGHRES_IMU", None])
+def test_a_tilt_that_no_sample_renews_is_not_repeated(lost):
+    # Given a recovery by attitude, in which the IMU's stream ends, or all that the vehicle sends
+    flight = simulated([{"takeoff": {"height_m": 1.5}}, FAST, {"land": {}}], sim={"walls": [wall(4.0)]})
+    flight.run_to("recovering")
+    flight.run_for(0.056)
+    lost_us, decoder = flight.now_us, flight.companion._decoder
+    decoder._readers = {n: reader for n, reader in decoder._readers.items() if lost not in (None, reader.name)}
+    flight.run_for(3.0)
+    # Then it rests by position, or by the vehicle's own failsafe
+    assert flight.messages("SET_ATTITUDE_TARGET")[-1][0] - lost_us < 150_000
+    assert np.abs(flight.series["position_ned_m"][-750:, :2] - [3.7, 0.0]).max() < 1.0

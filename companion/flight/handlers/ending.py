@@ -197,6 +197,14 @@ def taken_by(flight: FlightContext, requested_mode: int | None, others: str) -> 
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
+def may_ask(flight: FlightContext, since_us: int, now_us: int) -> bool:
+    """Whether a mode may be asked for: straight after a report of the present one. Without a report the wait ends."""
+    vehicle = flight.vehicle
+    is_told = vehicle.mode_received_us == now_us and vehicle.is_mode_known
+    is_old = now_us - vehicle.last_received_us >= OLD_NEWS_US
+    return is_told or is_old or (now_us - since_us) * 1e-6 >= flight.mission.companion.link.silence_s
+
+
 class Released(Handler[FlightContext]):
     """Nothing more to do: somebody else has the vehicle, or it was never taken."""
 
@@ -216,9 +224,7 @@ class GiveAway(Handler[FlightT]):
     def _ask_for(self, mode: int, flight: FlightT, inputs: Inputs, now_us: int) -> CommandOutcome | None:
         vehicle = flight.vehicle
         if not self._is_asked:
-            is_told = vehicle.mode_received_us == now_us and vehicle.is_mode_known
-            is_old = now_us - vehicle.last_received_us >= OLD_NEWS_US
-            if not (is_told or is_old or (now_us - self._began_us) * 1e-6 >= flight.mission.companion.link.silence_s):
+            if not may_ask(flight, self._began_us, now_us):
                 return None
             self._is_asked = True
             flight.ask_for_mode(mode)
@@ -239,6 +245,7 @@ class HandOver(GiveAway[FlightContext]):
         super().__init__(flight, now_us)
         autopilot = flight.vehicle.autopilot
         self._mode = autopilot.land if flight.mission.on_interrupt == "land" else autopilot.hold
+        self._asked_before = flight.command_client.requested_mode
         flight.command_client.cancel()
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
         if flight.armed_at_us is None and flight.expected_mode == autopilot.setpoints:
@@ -254,6 +261,9 @@ class HandOver(GiveAway[FlightContext]):
 
     def _is_over(self, flight: FlightContext, inputs: Inputs, now_us: int) -> bool:
         """Whether there is nothing left to ask for, or another has taken the vehicle."""
+        if self._asked_before is not None and flight.vehicle.custom_mode == self._asked_before:
+            # Late: it was asked for, and given up.
+            flight.expected_mode = self._asked_before
         if (holder := who_decided(flight, self._mode)) is not None:
             flight.report(now_us, "mode", f"{holder} took over in {flight.vehicle.mode_name}")
             return True

@@ -44,7 +44,8 @@ class Recover(Handler[FlightT]):
         """Attitude and thrust until it rests; then its place."""
         place = self._hit.setpoint_ned_m
         yaw_rad = flight.heading_towards()
-        if not self._hit.leans:
+        # A tilt that no sample renews leads away for as long as it is repeated.
+        if not self._hit.leans or flight.reflex.is_without_imu(now_us):
             return Target(place, yaw_rad)
         acceleration, lean = flight.reflex.lean()
         return Target(place, yaw_rad, None, acceleration, lean)

@@ -3,6 +3,7 @@
 import math
 
 from companion.flight.context import FlightContext, Handler, Inputs, Target, Transition, as_text
+from companion.flight.handlers.ending import may_ask
 from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
@@ -57,6 +58,9 @@ class TakeOff(Handler[FlightContext]):
         return self._now(flight, inputs, now_us)
 
     def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        if flight.vehicle.armed:
+            text = "the vehicle was armed, and not by the companion"
+            return Transition(Trigger.CONTROL_LOST, text, is_left=True)
         if flight.command_client.pending is None:
             if now_us - self._started_us < flight.mission.companion.flight.setpoint_lead_s * 1e6:
                 return None
@@ -173,6 +177,7 @@ class Land(Handler[FlightContext]):
         self._target = flight.target and flight.target.at_rest()
         self._is_asked = self._landing = False
         self._near = Lasting()
+        self._ready_us: int | None = None
         flight.is_landing = True
 
     def _waits(self, flight: FlightContext, now_us: int) -> bool:
@@ -189,7 +194,10 @@ class Land(Handler[FlightContext]):
                 return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed in the air", is_left=True)
             return Transition(Trigger.DISARMED)
         if not self._is_asked:
-            if self._waits(flight, now_us):
+            if self._ready_us is None and self._waits(flight, now_us):
+                return None
+            self._ready_us = self._ready_us or now_us
+            if not may_ask(flight, self._ready_us, now_us):
                 return None
             self._is_asked = True
             flight.count_asked_mode()

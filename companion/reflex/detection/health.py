@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
-from companion.motion.config import KEPT_US, LONGEST_GAP_US, MOTORS_RAD_S2, STAMP_RESOLUTION_US
+from companion.motion.config import MOTORS_RAD_S2, STAMP_RESOLUTION_US
 from companion.motion.strapdown import VelocityFix
 from companion.reflex.config import EXCESS, FusedConfig, StreamHealthConfig
 from companion.reflex.detection.fused import FusedState
@@ -58,15 +58,6 @@ class SampleGate:
     values: tuple[Vector3, Vector3] | None = None  # of the newest IMU sample
     still_wxyz: Quaternion | None = None  # the first attitude since the first of the samples that are equal to it
     is_stuck: bool = False
-    late_since_us: int | None = None  # by the vehicle's clock, since when every IMU sample has come late
-
-    def is_late(self, time_boot_us: int, newest_boot_us: int) -> bool:
-        """Whether an IMU sample comes behind a newer one. Where all do for a while, that one's stamp was wrong."""
-        if not 0 <= newest_boot_us - time_boot_us < KEPT_US:
-            self.late_since_us = None
-            return False
-        since_us = self.late_since_us = time_boot_us if self.late_since_us is None else self.late_since_us
-        return time_boot_us - since_us < LONGEST_GAP_US
 
     def imu(self, sample: ImuSample) -> bool:
         """Take one sample; whether it is accepted."""

@@ -10,6 +10,7 @@ from pydantic import field_validator
 
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vector3
 from companion.motion.config import KEPT_US
+from companion.motion.history import Lateness
 from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
 from companion.reflex.detection.detector import Detector, DetectorState, Phase, Situation
 from companion.reflex.detection.fused import FusedDetector, FusedState
@@ -68,6 +69,7 @@ class CollisionMonitor:
     stream_health: StreamHealth
     no_data_reason: str | None = None  # why an armed detector could miss a hit; None while the streams are healthy
     gate: SampleGate = field(default_factory=SampleGate)
+    lateness: Lateness = field(default_factory=Lateness)  # of the IMU's samples
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_attitude_old: bool = False  # too old to integrate the accelerometer
     is_introduced: bool = False  # threshold and losses have been reported
@@ -119,7 +121,7 @@ def advance(
                 continue
             monitor.imu_fault = None
             imu_samples += 1
-            if monitor.gate.is_late(sample.time_boot_us, estimator.strapdown.time_boot_us):
+            if monitor.lateness.is_late(sample.time_boot_us, estimator.strapdown.time_boot_us):
                 continue
         elif type(sample) is Attitude and not monitor.gate.attitude(sample):
             continue

@@ -15,6 +15,14 @@ IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "landing"]
 ON_SETPOINTS = ["takeoff", "mission", "recovering", "holding"]
 
 
+SET_MODE = 176
+
+
+def is_asked_to_land(f: Flight) -> bool:
+    """By PX4's sub-mode of AUTO."""
+    return any(message.command == SET_MODE and message.param3 == 6 for _, message in f.messages("COMMAND_LONG"))
+
+
 def assert_silent_from_now(f: Flight) -> None:
     """No setpoint and no command for three seconds, well beyond PX4's loss time-out."""
     commands = len(f.vehicle.commands)
@@ -60,6 +68,39 @@ def test_what_a_failsafe_has_all_but_landed_does_not_take_off_again():
     f = flying_in("takeoff")
     f.vehicle.failsafe_takes(LAND)
     f.run_to("aborted", 0.2)
+
+
+@pytest.mark.parametrize("before_us", [20_000, 90_000])
+def test_a_pilot_who_took_over_just_before_the_landing_is_asked_for_keeps_the_vehicle(before_us):
+    f = flying_in("mission")
+    landing = f.copy()
+    landing.run_until(lambda: is_asked_to_land(landing), 60.0)
+    f.run_until(lambda: f.now_us >= landing.now_us - before_us, 60.0)
+    f.vehicle.pilot_takes(POSCTL)
+    f.run_for(3.0)
+    assert f.vehicle.mode == POSCTL and "the pilot took over" in f.report.reason
+
+
+def test_a_landing_that_was_asked_for_just_before_ctrl_c_is_no_pilot():
+    f = flying_in("mission")
+    f.run_until(lambda: is_asked_to_land(f), 60.0)
+    f.companion.stop("Ctrl-C")
+    f.run_to_end()
+    assert f.vehicle.mode == LOITER and not any("pilot" in text for text in f.texts())
+
+
+def test_a_vehicle_that_somebody_else_arms_before_offboard_is_taken_is_left():
+    # Given one that refuses the mode twice
+    def refuses(command, count):
+        return command == SET_MODE and count <= 2
+
+    f = flight(FakeVehicle(ack=lambda *asked: [int(refuses(*asked))], obey=lambda *asked: not refuses(*asked)))
+    f.run_to("takeoff")
+    f.run_for(0.3)
+    f.vehicle.pilot_takes(POSCTL)
+    f.vehicle.armed, f.vehicle.landed, f.vehicle.position[2] = True, 2, -3.0
+    f.run_for(6.0)
+    assert f.vehicle.mode == POSCTL and f.state == "aborted" and not f.told("armed")
 
 
 def test_px4_leaving_land_mode_once_it_is_down_is_not_a_pilot():
@@ -186,9 +227,6 @@ def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
     f.companion.stop("Ctrl-C")
     assert f.run_to_end(0.1).outcome == "aborted"
     assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]
-
-
-SET_MODE = 176
 
 
 def modes_asked(f: Flight) -> int:

@@ -160,6 +160,15 @@ def test_a_condition_of_the_mission_ends_it(condition, happens, words):
     assert f.vehicle.mode == mode
 
 
+@pytest.mark.parametrize("ahead_ms", [1_200, 1_950])
+def test_one_position_stamped_ahead_or_one_report_of_an_empty_battery_ends_no_flight(ahead_ms):
+    f = hovering(FakeVehicle(battery_percent=80), abort_when={"battery_below_percent": 20})
+    ahead = {"time_boot_ms": f.vehicle.time_us // 1000 + ahead_ms, "z": -1.5}
+    attacked(f, [made("LOCAL_POSITION_NED", ahead), made("SYS_STATUS", {"battery_remaining": 0})])
+    f.run_for(3.0)
+    assert f.state == "mission"
+
+
 def test_one_position_outside_the_fence_ends_no_flight_and_two_do():
     f = hovering()
 

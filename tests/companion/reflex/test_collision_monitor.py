@@ -17,13 +17,13 @@ from companion import messages
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Quaternion, Sample, Vector3
 from companion.mission.config import CompanionConfig
 from companion.motion.config import GRAVITY_M_S2
+from companion.motion.history import Lateness
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import Impact, ImpactKind, Phase, Situation
-from companion.reflex.detection.health import SampleGate
 from companion.reflex.detection.monitor import advance, start_monitor
 from companion.reflex.reflex import Reflex
 
@@ -302,13 +302,13 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
 
 
 def test_an_imu_sample_that_is_stamped_ahead_hides_what_comes_after_it_for_a_tenth_of_a_second_at_most():
-    gate, newest_us, taken_us = SampleGate(), 3_900_000, []
+    order, newest_us, taken_us = Lateness(), 3_900_000, []
     # Given one that is ahead by 1.9 s, amid some that are late by an interval
     for us in range(2_000_000, 2_200_000, INTERVAL_US):
-        if not gate.is_late(us, newest_us):
+        if not order.is_late(us, newest_us):
             newest_us = us
             taken_us.append(us)
-            assert gate.is_late(us - INTERVAL_US, newest_us)
+            assert order.is_late(us - INTERVAL_US, newest_us)
     assert taken_us[0] == 2_100_000 and len(taken_us) == 100_000 // INTERVAL_US
 
 

@@ -6,15 +6,18 @@ import os
 import signal
 import threading
 import time
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import pytest
 import yaml
 from pymavlink import mavutil
 
+from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
+from rebound_cli import guard
 from rebound_cli.flights import kept
 from rebound_cli.guard import run_guard
+from rebound_cli.live.realtime import Loop
 from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
 from rebound_cli.results import run_folder
@@ -179,3 +182,16 @@ def test_a_guard_waits_for_its_cable_recovers_over_it_and_outlasts_that_it_is_un
     # What struck it may touch it again before it is clear: part of the same recovery
     assert summary["reconnects"] == 1 and len(summary["collisions"]) >= 2
     assert_comes_again(folder)
+
+
+def test_a_guard_that_has_met_its_vehicle_goes_on_waiting_for_it_and_one_that_is_cut_off_says_so(tmp_path, monkeypatch):
+    options = build_parser().parse_args(["guard", "--connect", "udpin://127.0.0.1:0", "--out", str(tmp_path)])
+    with monkeypatch.context() as patched:
+        patched.setattr(guard, "_recorded", recorded := Mock(side_effect=["", "over"]))
+        with pytest.raises(ReboundError, match="Over"):
+            run_guard(options)
+    assert [call.args[0].companion.link.wait for call in recorded.call_args_list] == [False, True]
+    monkeypatch.setattr(Loop, "run", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        run_guard(options)
+    assert json.loads((tmp_path / "summary.json").read_text())["outcome"] == "cut off"

@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import os
+import pty
 import signal
 import socket
 import stat
@@ -120,6 +121,18 @@ def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile
     os.write(writes, b"yes\n")
     person.poll(companion)
     assert companion.confirm_plan.called and not companion.stop.called
+    for descriptor in (reads, writes):
+        os.close(descriptor)
+
+
+def test_what_was_typed_before_the_plan_is_shown_says_nothing_of_it():
+    writes, reads = pty.openpty()
+    companion, person = planned(), AskPerson(Console(io.StringIO()), reads)
+    for is_shown in (False, True):
+        os.write(writes, b"y\n")
+        for _ in range(3):
+            person.poll(companion)
+        assert companion.confirm_plan.called is is_shown
     for descriptor in (reads, writes):
         os.close(descriptor)
 

@@ -16,7 +16,9 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from companion.mavlink.signing import Signing, stamp_at
+from companion.shell.connections.addresses import open_connection
 from companion.shell.signing_files import StampFile, write_new
+from rebound_cli.live.heir import Heir
 from rebound_cli.live.signed_connection import SignedConnection
 
 KEY = hashlib.sha256(b"test").digest()
@@ -122,6 +124,24 @@ def heard(end, wait_s):
         return end.recv(4096)
     except TimeoutError:
         return b""
+
+
+def test_words_that_are_taken_back_are_not_said_by_an_heir_that_was_late():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
+        end.bind(("127.0.0.1", 0))
+        link, heir = open_connection(f"udpout://127.0.0.1:{end.getsockname()[1]}"), Heir()
+        # Given one that had no turn while more was left to it than waits for it
+        os.kill(heir._process.pid, signal.SIGSTOP)
+        for _ in range(250):
+            heir.hear([(0.0, bytes(80))] * 8, link)
+        heir.hear([], link)
+        os.kill(heir._process.pid, signal.SIGCONT)
+        # When the next steps tell it again that there is none
+        while heir._has_words:
+            heir.hear([], link)
+        heir.leave()
+        link.close()
+        assert heard(end, 0.2) == b""
 
 
 def test_a_companion_that_is_killed_says_its_last_words_each_at_its_time(vehicle):

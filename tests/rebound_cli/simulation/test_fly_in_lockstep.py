@@ -169,6 +169,11 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     whole = (first / EVENTS_NAME).read_text()
     (first / EVENTS_NAME).write_text(whole.replace('"next_step": 3', '"next_step": 4'))
     assert resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))["at_step"] == 4
+    # A reset of the vehicle's position since has moved its frame
+    reset = {"time_us": 9, "kind": "estimate", "text": "", "data": {"shift_ned_m": [3.0, 0.0, 0.0]}}
+    (first / EVENTS_NAME).write_text(f"{whole}{json.dumps(reset)}\n")
+    moved = resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))
+    assert moved["origin_ned_m"][0] - resume["origin_ned_m"][0] == 3.0
     (first / EVENTS_NAME).write_text(whole)
     # A process that was killed leaves no word of an end, and perhaps half a line
     events = (first / EVENTS_NAME).read_text().splitlines(keepends=True)
