@@ -39,7 +39,7 @@ port = number(int, 0, 65_535, "a port: give a number from 0 to 65535")
 def mission_file(text: str) -> Path:
     """The file itself, or a mission of that name that ships with the program."""
     path = Path(text)
-    if not path.exists() and path.name == text and not path.suffix:
+    if not os.path.isfile(text) and path.name == text and not path.suffix:
         return shipped_missions().get(text, path)
     return path
 

@@ -2,6 +2,7 @@
 
 import argparse
 import errno
+import io
 import itertools
 import re
 import sys
@@ -53,6 +54,8 @@ def _parsers_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentPa
 
 
 def main(words: Sequence[str] | None = None) -> int:
+    # A shell's >&- leaves none.
+    sys.stdout, sys.stderr = sys.stdout or io.StringIO(), sys.stderr or io.StringIO()
     words = _with_plain_sim(sys.argv[1:] if words is None else words)
     command = next(iter(words), "")
     if command in TABLE["gone"]:

@@ -112,7 +112,7 @@ class GuardConnect(Meet[GuardContext]):
         return [*super()._commands(guard), echoes, sticks]
 
     def _judge(self, guard: GuardContext, now_us: int) -> Transition | None:
-        complaint = guard.streams.too_slow(guard.vehicle.autopilot) or guard.round_trip.complaint()
+        complaint = self._missing(guard) or guard.round_trip.complaint()
         if complaint is not None and (guard.mission.companion.link.wait or guard.was_met):
             self._ask_again(guard, f"not guarded by now: {complaint}", now_us)
             return None

@@ -281,14 +281,19 @@ class FusedConfig(StrictModel):
     """How long such a force is looked at."""
 
 
+# No vehicle is larger: more is a length in centimetres or millimetres.
+LARGEST_M = 2.0
+Length = Annotated[Positive, Field(le=LARGEST_M)]
+
+
 class GuardsConfig(StrictModel):
     """How far the vehicle's guards reach. The defaults are the paper's vehicle's."""
 
     retired = frozenset({"stiffness_per_s2", "damping_per_s", "travel_m", "gyration_frd_m"})
 
-    centre_m: Positive = 0.145
+    centre_m: Length = 0.145
     """From the vehicle's middle to each guard's, a quad-x."""
-    radius_m: Positive = 0.08
+    radius_m: Length = 0.08
     """Of a guard, seen from above."""
     height_m: NotNegative = 0.03
     """Of a guard's rim, as the report draws it."""

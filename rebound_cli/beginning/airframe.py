@@ -7,6 +7,7 @@ from rebound_cli.inputs.inputs import load_world
 from rebound_cli.simulation.compiling import stand_own
 from sim_vehicle.hil.parameters import as_airframe_file, as_environment, as_params_file
 from sim_vehicle.json.parameters import as_parameter_file
+from sim_vehicle.json.vehicle import check_rotors
 
 _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airframe_file}
 
@@ -21,4 +22,5 @@ def run_airframe(options: Namespace) -> None:
     elif options.format is not None or options.position is not None:
         raise ConfigurationError("--format and --position belong to px4: leave them out for ArduPilot.")
     else:
+        check_rotors(airframe)
         print(as_parameter_file(airframe))

@@ -128,7 +128,9 @@ def size_of(folder: Path) -> int:
 
 
 def runs_folder(given: Path | None) -> Path:
-    """The folder of runs that a person means."""
+    """The folder of runs that a person means. Raises RunFolderError where there is none of that name."""
+    if given is not None and not given.is_dir():
+        raise run_folder.RunFolderError(f"{given} is no folder.")
     return given or (SERVICE_RUNS if SERVICE_RUNS.is_dir() and not RUNS_FOLDER.is_dir() else RUNS_FOLDER)
 
 
@@ -158,6 +160,8 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
     for folder in (runs / name, Path(name).resolve()):
         if (folder / TLOG_NAME).is_file():
             return KeptFlight(folder, size_of(folder))
+    if Path(name).exists():
+        raise run_folder.RunFolderError(f"{name} is no flight's folder; `rebound replay` reads logs.")
     near = nearest(name, [flight.name for flight in flights])
     meant = f"did you mean {near}?" if near else "`rebound logs list` names those that are."
     raise run_folder.RunFolderError(f"No flight {name} is in {runs}; {meant}")

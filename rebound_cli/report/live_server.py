@@ -49,7 +49,7 @@ class WatchServer(ThreadingHTTPServer):
         while not self.is_over.is_set():
             try:
                 chunk = self._tail.read()
-            except ReboundError as error:
+            except (ReboundError, OSError) as error:
                 print(f"rebound: {error}", file=sys.stderr)
                 return
             if chunk is not None:

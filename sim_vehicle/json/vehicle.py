@@ -12,14 +12,19 @@ from sim_vehicle.scene import Scene
 SAMPLE_INTERVAL_US = 1_000
 
 
+def check_rotors(airframe: Airframe) -> None:
+    """Raises AirframeError."""
+    if airframe.rotors:
+        raise AirframeError(f"{airframe.name} has rotors of its own: ArduPilot flies a quad-x of equal arms here.")
+
+
 class JsonVehicle:
     """One sample of the inertial sensor a step; time begins at 0, as ArduPilot's clock does."""
 
     def __init__(self, airframe: Airframe, scene: Scene, seed: int) -> None:
         """Raises SceneError where the start is not free, AirframeError where it does not stand or for other motors."""
         check_start(airframe, scene)
-        if airframe.rotors:
-            raise AirframeError(f"{airframe.name} has rotors of its own: ArduPilot flies a quad-x of equal arms here.")
+        check_rotors(airframe)
         self._plant = Plant(sampled_every(airframe, SAMPLE_INTERVAL_US), scene, seed)
         self._motors = airframe.rotor_count
         self._body = self._plant.state.body

@@ -1,7 +1,10 @@
 """Bad input, in words, files or --set: one clear sentence with place and remedy, an exit code, nothing left running."""
 
 import json
+import os
 import socket
+import subprocess
+import sys
 
 import pytest
 
@@ -13,7 +16,7 @@ from rebound_cli.inputs.inputs import mission_from, world_from
 from rebound_cli.main import main
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.parameters import px4_parameters
-from tests.rebound_cli.command import SQUARE, WALL, assert_one_clear_sentence, run_here
+from tests.rebound_cli.command import ROOT, SQUARE, WALL, assert_one_clear_sentence, run_here
 
 
 def test_a_port_in_use(tmp_path):
@@ -58,7 +61,7 @@ def test_nothing_is_said_of_an_airframe_of_one_s_own_that_leaps_off_the_ground(t
     assert result.stdout == ""
 
 
-CONNECTED = ("fly", SQUARE, "--connect")
+CONNECTED, GUARDS = ("fly", SQUARE, "--connect"), "companion.estimate.guards.centre_m"
 
 
 @pytest.mark.parametrize(
@@ -77,6 +80,14 @@ CONNECTED = ("fly", SQUARE, "--connect")
         (("check", "wal.yaml"), ("wal.yaml: no such file; did you mean wall?",)),
         (("airframe", "px4", "--airframe", "none"), ("foldable", "rigid")),
         (("airframe", "ardupilot", "--format", "env"), ("--format and --position belong to px4",)),
+        (("airframe", "ardupilot", "--airframe", "hexa"), ("hexa has rotors of its own: ArduPilot flies a quad-x",)),
+        (
+            ("guard", "--connect", "udpin://:1", "--set", f"{GUARDS}=160"),
+            ("less than or equal to 2, not 160",),
+        ),
+        (("logs", "list", "--runs", "nowhere"), ("nowhere is no folder",)),
+        (("report", WALL), (f"{WALL} is no flight's folder; `rebound replay` reads logs",)),
+        (("check", 300 * "a"), ("File name too long",)),
         (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
         ((*CONNECTED, "the drone"), ("udpin://HOST:PORT",)),
         (("preflight", "--connect", "nowhere"), ("'nowhere' is not a connection address",)),
@@ -341,3 +352,10 @@ def test_of_thousands_of_faults_the_first_ones_are_shown():
     found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
     said = complaint(validated, Mission, found, found.data).splitlines()
     assert len(said) == 6 and said[0].startswith("demo.yaml:3: items.0.wait: ") and "more" in said[-1]
+
+
+def test_a_folder_of_its_name_hides_no_mission_and_a_closed_output_ends_no_command(tmp_path):
+    (tmp_path / "wall").mkdir()
+    command = f"{sys.executable} -m rebound_cli check wall >&-"
+    done = subprocess.run(command, shell=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, stderr=-1)
+    assert (done.returncode, done.stderr) == (0, b"")

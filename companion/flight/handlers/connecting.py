@@ -24,6 +24,7 @@ class Meet(Handler[FlightT], ABC):
         flight.vehicle.attitude_parameters.clear()
         self._started_us = now_us  # to look for a vehicle, then with it
         self._requests: Iterator[VehicleCommand] | None = None
+        self._is_answered = False  # any of them
         self._measuring_since_us: int | None = None
         self.is_told = False  # what is waited for
 
@@ -67,6 +68,7 @@ class Meet(Handler[FlightT], ABC):
         """A refused request is no reason to stop: what counts is what then arrives."""
         pending, asked = flight.command_client.pending, flight.streams.asked.get(MessageId.HIGHRES_IMU)
         outcome, imu = flight.command_outcome(inputs, False, now_us), flight.vehicle.autopilot.lesser_imu
+        self._is_answered |= outcome is not None and (outcome.succeeded or outcome.refused)
         has_none = outcome is not None and outcome.refused and pending == asked
         if has_none and asked is not None and imu is not None:
             requests = self._requests = chain([set_message_interval(imu, round(asked.parameters[1]))], requests)
@@ -80,6 +82,12 @@ class Meet(Handler[FlightT], ABC):
         else:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
+
+    def _missing(self, flight: FlightT) -> str | None:
+        """What stands against a flight with what was measured, or None."""
+        if not self._is_answered:
+            return "the vehicle answers nothing: does it hear this computer, and want no signatures (--signing-key)?"
+        return flight.streams.too_slow(flight.vehicle.autopilot)
 
     def _ask_again(self, flight: FlightT, text: str, now_us: int) -> None:
         """What is missing may come: a vehicle that has just started has no position."""
@@ -99,14 +107,14 @@ class Connect(Meet[FlightContext]):
     """On the ground, with a vehicle that nobody flies."""
 
     def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
-        too_slow, link = flight.streams.too_slow(flight.vehicle.autopilot), flight.mission.companion.link
+        missing, link = self._missing(flight), flight.mission.companion.link
         # A vehicle that has just started sends some of them later.
         may_wait = link.wait or now_us - self._started_us < link.heartbeat_wait_s * 1e6
-        if too_slow is not None and may_wait:
-            self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
+        if missing is not None and may_wait:
+            self._ask_again(flight, f"not ready by now: {missing}", now_us)
             return None
         self._report_streams(flight, now_us)
-        complaint = too_slow or ground_check(flight)
+        complaint = missing or ground_check(flight)
         return Transition(Trigger.VEHICLE_READY) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 

@@ -18,7 +18,7 @@ from tests.companion.flight.test_companion_authority import heartbeat
 
 def failed(vehicle: FakeVehicle):
     f = flight(vehicle)
-    report = f.run_to_end(14.0)
+    report = f.run_to_end(40.0)
     assert (report.outcome, f.state) == ("failed", "aborted")
     return f, report
 
@@ -34,6 +34,7 @@ def failed(vehicle: FakeVehicle):
         (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),
         (FakeVehicle(armed=True), "armed already"),
         (FakeVehicle(landed=2), "not on the ground"),
+        (FakeVehicle(ack=lambda *_: []), "the vehicle answers nothing"),
     ],
 )
 def test_vehicles_that_cannot_be_flown_are_refused_with_the_reason(vehicle, word):
