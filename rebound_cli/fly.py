@@ -21,7 +21,7 @@ from rebound_cli.inputs import inputs
 from rebound_cli.live.console import Console, console_for
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import AskPerson, Computer, FlightFaultError, Loop, confirm_now, fly_realtime, watched
-from rebound_cli.live.signed_connection import open_signed, refused_packets
+from rebound_cli.live.signed_connection import open_signed, refused_packets, unheard_text
 from rebound_cli.live.status import StatusServer, served
 from rebound_cli.replay.recording import Followed
 from rebound_cli.report.showing import offer_page, show_flight, watched_page
@@ -218,7 +218,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
         # In real time each was printed as it happened.
         console.events(flight.recorder.events, flown.report.started_at_us)
     console.still()
-    console.print("\n" + ending_text(summary))
+    unheard = "" if flown.report.stream_rates_hz else unheard_text(flown.refused_packets)
+    console.print(f"\n{ending_text(summary)}{unheard}")
     if writer is not None and writer.loss is not None:
         console.print(f"\n{writer.loss} ({writer.lost} steps)")
     try:

@@ -1,6 +1,5 @@
 """`rebound guard` on a real connection and the real clock: until Ctrl-C, SIGTERM, or nothing to guard."""
 
-import shutil
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -50,7 +49,7 @@ def run_guard(options: Namespace) -> None:
                 config = config.model_copy(update={"companion": config.companion.model_copy(update={"link": link})})
         if interrupts.reason is None:
             text = outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else ".")
-            raise ReboundError(text + unheard_text(connection))
+            raise ReboundError(text + unheard_text(refused_packets(connection)))
 
 
 def _recorded(
@@ -107,9 +106,8 @@ def _recorded(
         with _reporting(console, folder):
             run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
     if outcome and flight.vehicle.identity is None and not flight.fault:
-        # No vehicle was met: it is no flight. A folder that a person has named may hold files of theirs.
-        if out is None:
-            shutil.rmtree(folder)
+        # No vehicle was met: it is no flight.
+        run_folder.forget(folder)
         return outcome
     left_alone = f", {flight.left_alone} left to the program that flies" if flight.left_alone else ""
     console.print(f"{summary['outcome']}; {hits_text(len(hits))}{left_alone}; log in {folder}")

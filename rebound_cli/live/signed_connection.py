@@ -1,7 +1,7 @@
 """The connection to a vehicle that signs, with the key of --signing-key; a plain one without."""
 
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.clock import Clock
@@ -68,7 +68,7 @@ def refused_packets(connection: Connection | None) -> dict[str, int]:
     return dict(connection.signing.refused) if isinstance(connection, SignedConnection) else {}
 
 
-def unheard_text(connection: Connection) -> str:
-    """What is added where no vehicle was heard: its packets may have been refused."""
-    refused = sum(refused_packets(connection).values())
-    return f" {refused} packets were refused: do both ends sign, with the same key?" if refused else ""
+def unheard_text(refused: Mapping[str, int]) -> str:
+    """What is added where no vehicle was heard: its packets may have been refused, by reason."""
+    count = sum(refused.values())
+    return f" {count} packets were refused: do both ends sign, with the same key?" if count else ""

@@ -17,7 +17,7 @@ from companion.shell.connections.addresses import parsed
 from companion.shell.connections.connection import Connection
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
-from rebound_cli.live.signed_connection import open_signed, unheard_text
+from rebound_cli.live.signed_connection import open_signed, refused_packets, unheard_text
 
 LONGEST_WAIT_S = 0.05
 # PX4 answers a parameter within 50 ms; after a second it has not taken it.
@@ -38,7 +38,7 @@ def run_preflight(options: Namespace) -> int:
                 console.print(news)
         if preflight.refusal is not None:
             refusal = preflight.refusal[:1].upper() + preflight.refusal[1:]
-            raise ConfigurationError(f"{refusal}.{unheard_text(connection)}")
+            raise ConfigurationError(f"{refusal}.{unheard_text(refused_packets(connection))}")
         found = findings(preflight)
         show(console, preflight.vehicle, found)
         if options.json:

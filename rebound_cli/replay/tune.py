@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from companion.mission.config import CompanionConfig
+from rebound_cli.flights.kept import hits_in, hits_text
 from rebound_cli.inputs.documents import parse_document, refuse_existing, validated
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError, clipping_text
@@ -23,7 +24,7 @@ from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.recording import log_file
 from rebound_cli.replay.report import Replay, replay_log
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.results.run_folder import read_summary
+from rebound_cli.results.run_folder import EVENTS_NAME, read_text, whole_lines
 
 # Why a setting is as it is, by its part of `companion:` and its name.
 Reasons: TypeAlias = Mapping[tuple[str, str], str]
@@ -67,7 +68,8 @@ def run_tune(options: Namespace) -> None:
     document = parse_document(text, str(out or "the settings"))
     validated(CompanionConfig, document, document.data["companion"], ("companion",))
     if left:
-        print(f"With these settings still {left} false alarms: this vehicle is not made quiet by thresholds.\n")
+        alarms = f"{left} false alarm{'s' if left > 1 else ''}"
+        print(f"With these settings still {alarms}: this vehicle is not made quiet by thresholds.\n")
     print(text, end="")
     if out is not None:
         out.write_text(text, encoding="utf-8")
@@ -80,8 +82,9 @@ def read_healthy(path: Path, config: CompanionConfig) -> Replay:
     Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing.
     """
     log = read_log(log_file(path))
-    flight, hits = replay_log(log, config), len((read_summary(path) or {}).get("collisions", ()))
-    wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else ""
+    flight, events = replay_log(log, config), path / EVENTS_NAME
+    hits = hits_in(whole_lines(read_text(events)).splitlines()) if events.is_file() else 0
+    wrong = f"it had {hits_text(hits)}" if hits > 0 else ""
     for crash in flight.findings.crashes:
         wrong = f"it crashed at {log.seconds(crash.at_us):.1f} s"
     if wrong:

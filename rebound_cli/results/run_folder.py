@@ -83,6 +83,14 @@ def create_run_folder(out: Path | None, mission_name: str) -> Path:
         number += 1
 
 
+def forget(folder: Path) -> None:
+    """Remove what a guard has written there, and the folder where nothing else is in it."""
+    for name in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME, SUMMARY_NAME, GUARD_NAME, VERSIONS_NAME):
+        (folder / name).unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
+
+
 class FlightRecorder:
     """Writes packets and events as they happen and keeps the events for the timeline.
 

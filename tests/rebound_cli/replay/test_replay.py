@@ -367,4 +367,4 @@ def test_a_crash_and_our_own_flight_with_a_hit_are_refused(wall_flight, monkeypa
     assert code == 1 and text == "" and "not a healthy flight, it crashed at 6.0 s" in error
     monkeypatch.undo()
     code, text, error = said(capsys, "tune", wall_flight[0])
-    assert code == 1 and text == "" and "its summary tells 1 collision;" in error
+    assert code == 1 and text == "" and "not a healthy flight, it had 1 hit;" in error
