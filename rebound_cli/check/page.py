@@ -27,7 +27,8 @@ def write_mission_page(path: Path, mission: Mission, world: SimulatedWorld, legs
     flight = planned_flight(mission, world, legs)
     items = [(rounded_s(flight, event["time_us"]), event["text"]) for event in flight.events if event["kind"] == "item"]
     told = {"sentence": f"Mission '{mission.name}', when nothing is hit", "lines": [mission.description]}
-    write_whole(path, assembled(content(flight) | UNFLOWN | told | {"modes": items}, SCRIPTS).encode())
+    shown = {"headings": {"h-replay": "The way", "h-events": "What would happen"}, "modes": items}
+    write_whole(path, assembled(content(flight) | UNFLOWN | told | shown, SCRIPTS).encode())
 
 
 def planned_flight(mission: Mission, world: SimulatedWorld, legs: Sequence[FlownLeg]) -> ShownFlight:
@@ -35,7 +36,7 @@ def planned_flight(mission: Mission, world: SimulatedWorld, legs: Sequence[Flown
     (north_m, east_m, _), standing_m = world.scene.start.position_ned_m, world.airframe.geometry.foot_depth_m
     # Later than all that was known beforehand.
     started_us = at_us = 1 + max((patch.found_at_us for patch in mission.obstacles.known), default=0)
-    events = [_event(at_us, "armed", "", origin_ned_m=(north_m, east_m, -standing_m))]
+    events = [_event(at_us, "armed", "armed", origin_ned_m=(north_m, east_m, -standing_m))]
     samples: list[tuple[int, LocalPosition]] = []
 
     def add(at_s: float, place_ned_m: Sequence[float], velocity_ned_m_s: Vector3) -> None:

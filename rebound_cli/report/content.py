@@ -92,7 +92,8 @@ def live_content(flight: ShownFlight) -> dict[str, Any]:
         name: {"of": 0, "rows": 0, "columns": {column: {**empty, "kind": "i4"} for column in columns}}
         for name, columns in {**COLUMNS, "imu": ("t",)}.items()
     }
-    return content(flight) | UNFLOWN | {"live": True, "sentence": "Waiting for the flight.", "tables": tables}
+    told = {"sentence": "Waiting for the flight.", "headings": {"h-replay": "Live"}}
+    return content(flight) | UNFLOWN | told | {"live": True, "tables": tables}
 
 
 def _told(flight: ShownFlight) -> Sequence[Mapping[str, Any]]:

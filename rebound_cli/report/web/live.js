@@ -4,7 +4,6 @@
 const ENDS = ["done", "aborted", "failed"];
 
 function goLive({ player, scene, scrubber, overview }) {
-  byId("h-replay").textContent = "Live";
   const headline = byId("sentence");
   // Who looks back stays there, until the end of the scrubber is reached again.
   let follows = true;

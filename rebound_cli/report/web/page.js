@@ -8,9 +8,11 @@ function addRows(list, rows) {
 }
 
 function addLegend(list) {
-  const entries = [["--red", "recovering"]];
+  const entries = [], isHit = flight.live || flight.recovering.length > 0;
+  if (isHit) entries.push(["--red", "recovering"]);
   modeNames.forEach((mode, number) => entries.push([MODE_COLOURS[(number + 1) % MODE_COLOURS.length], mode]));
-  if (flight.has_places) entries.push(["--ink", "◆ setpoint"], ["--red", "➤ normal, with its cone"]);
+  if (flight.has_places) entries.push(["--ink", "◆ setpoint"]);
+  if (flight.has_places && isHit) entries.push(["--red", "➤ normal, with its cone"]);
   if (flight.surfaces.length) entries.push(["--purple", "▱ remembered"]);
   if (flight.obstacles.length) entries.push(["--stone", "▰ obstacle"]);
   if (tables.truth && flight.has_places) entries.push(["--grey", "where it really was"]);
@@ -61,7 +63,7 @@ function addDownload(list, name, about, text) {
 
 function addDownloads(list) {
   const stem = flight.name.replace(/[^A-Za-z0-9_.-]+/g, "-") || "flight";
-  for (const [name, table] of Object.entries(tables)) {
+  for (const [name, table] of Object.entries(tables).filter(([, { of }]) => flight.live || of > 0)) {
     const rows = table.length === table.of ? `${table.of} rows` : `${table.length} of ${table.of} rows: all round the hits, the loudest elsewhere`;
     addDownload(list, `${stem}-${name}.csv`, rows, () => csvOf(table));
   }
@@ -107,7 +109,9 @@ function start() {
   byId("name").textContent = flight.name;
   byId("sentence").textContent = flight.sentence;
   byId("lines").append(...flight.lines.map((line) => element("li", line)));
+  for (const [heading, text] of Object.entries(flight.headings || {})) byId(heading).textContent = text;
   for (const part of flight.hides || []) document.querySelector(`[aria-labelledby="${part}"]`).hidden = true;
+  for (const control of [byId("before"), byId("after"), byId("slow").parentElement]) control.hidden = !flight.moments.length;
   addRows(byId("link"), flight.link);
   addAbout();
 
