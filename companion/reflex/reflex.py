@@ -197,11 +197,12 @@ class Reflex:
         return 1.0 if newest.estimator.is_measured_apart else min(max(share, 0.0), 1.0)
 
     def place_ned_m(self, reported: LocalPosition) -> Vector3:
-        """Where the vehicle is: by the belief in a recovery, then as reported without what is left wrong."""
+        """Where the vehicle is: by the belief in a recovery, as far as the IMU carries it on; then as reported without
+        what is left wrong."""
         newest = self.newest
         if newest is None:
             return reported.position_ned_m
-        if not newest.is_over:
+        if not newest.is_over and reported.time_boot_us - self.sample_boot_us <= LONGEST_GAP_US:
             return newest.estimator.motion.position_ned_m
         share = self._left_share(reported.time_boot_us)
         return plus(reported.position_ned_m, -share, newest.estimator.position_error_m)

@@ -116,6 +116,8 @@ def test_a_tilt_that_no_sample_renews_is_not_repeated(lost):
     lost_us, decoder = flight.now_us, flight.companion._decoder
     decoder._readers = {n: reader for n, reader in decoder._readers.items() if lost not in (None, reader.name)}
     flight.run_for(3.0)
-    # Then it rests by position, or by the vehicle's own failsafe
+    # Then it rests by position, where it is as it reports, or by the vehicle's own failsafe
+    reflex, latest = flight.companion.core.reflex, flight.companion.core.flight.latest
+    assert lost is None or reflex.place_ned_m(latest) == pytest.approx(latest.position_ned_m, abs=0.1)
     assert flight.messages("SET_ATTITUDE_TARGET")[-1][0] - lost_us < 150_000
     assert np.abs(flight.series["position_ned_m"][-750:, :2] - [3.7, 0.0]).max() < 1.0
