@@ -7,6 +7,7 @@ from companion.flight.context import FlightContext, Transition
 from companion.guard.config import GuardConfig
 from companion.guard.states import Trigger
 from companion.messages import Asked, Sticks
+from companion.motion.settling import Lasting
 
 
 @dataclass(slots=True)
@@ -19,6 +20,7 @@ class GuardContext(FlightContext):
     after_recovery: Transition = field(default=Transition(Trigger.SETTLED))
     previous_mode: int | None = None
     is_to_hold: bool = False  # is given back to hold whatever is configured
+    others_stream: Lasting = field(default_factory=Lasting)  # by the mode, which is not the guard's
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
     was_met: bool = False  # since the guard began, and found fit to be guarded
     has_stood: bool = False  # on the ground, or disarmed, since the guard began

@@ -20,7 +20,6 @@ from companion.messages import (
     set_message_interval,
 )
 from companion.motion.config import SAME_M_S
-from companion.motion.settling import Lasting
 from companion.reflex.detection.detector import NO_POSITION, ON_THE_GROUND
 
 # Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
@@ -49,6 +48,10 @@ def observe(guard: GuardContext, samples: Sequence[Sample], now_us: int) -> str 
             guard.sinks_m_s, guard.sinks_us = sample.velocity_down_m_s or 0.0, now_us
         elif isinstance(sample, Sticks):
             guard.sticks_now, guard.sticks_us = sample, now_us
+    # Where the mode needs no stream, one that has left it may have been sent somewhere once.
+    streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
+    guard.others_stream.update(streams and guard.expected_mode is None, now_us)
+    guard.program_elsewhere |= guard.others_stream.lasts_us > OTHERS_STREAM_US and not guard.keeps_others_out
     latest = guard.vehicle.history.latest
     if guard.vehicle.armed is False:
         guard.program_elsewhere = guard.is_wreck = False
@@ -148,9 +151,6 @@ class StandBy(Handler[GuardContext]):
 class Watching(Handler[GuardContext]):
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
-    def __init__(self, guard: GuardContext, now_us: int) -> None:
-        self._streamed = Lasting()  # in OFFBOARD, in which the guard sends none
-
     def target(self, guard: GuardContext, now_us: int) -> Target | None:
         """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         streams_elsewhere = guard.program_elsewhere or now_us - guard.others_setpoint_us < OTHERS_STOPPED_US
@@ -158,9 +158,5 @@ class Watching(Handler[GuardContext]):
         return Target(guard.latest.position_ned_m, None) if is_wanted and not streams_elsewhere else None
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Transition | None:
-        # Where the mode needs no stream, one that has left it may have been sent somewhere once.
-        streams = guard.vehicle.flies_setpoints and guard.vehicle.autopilot.wants_setpoints_first
-        self._streamed.update(streams, now_us)
-        guard.program_elsewhere |= self._streamed.lasts_us > OTHERS_STREAM_US and not guard.keeps_others_out
         reason = why_not(guard)
         return None if reason is None else Transition(Trigger.NOT_TO_GUARD)

@@ -257,6 +257,20 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.guard.core.flight.left_alone == len(air.told("left_alone"))
 
 
+def test_a_program_elsewhere_is_remembered_though_its_mode_was_not_to_be_guarded():
+    air = Air(GuardConfig(modes=["POSCTL", "AUTO.TAKEOFF", "AUTO.LOITER"]))
+    air.flown_by_sticks()
+    air.every(0.05, lambda: air.velocity(0.0))
+    air.run_for(0.3)
+    air.set_mode(OFFBOARD)
+    air.run_for(3.0)
+    assert air.state is State.STANDING_BY
+    air.set_mode(MANUAL_POSITION)
+    air.forward = 0.3
+    air.run_until(lambda: air.told("left_alone") != [], 20.0)
+    assert air.told("take_over") == []
+
+
 def test_a_glance_of_offboard_leaves_a_pilot_guarded():
     air = Air()
     air.flown_by_sticks()
