@@ -6,14 +6,16 @@ import shutil
 import signal
 import socket
 import subprocess
+import threading
 import time
 import tomllib
 
 import pytest
+from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.json.parameters import as_parameter_file
-from tests.clients.simulator import simulator
+from tests.clients.simulator import free_port, simulator
 from tests.rebound_cli import command
 from tests.rebound_cli.command import SQUARE, WALL, assert_comes_again, run_here, start, wait_for_event
 from tests.sim_vehicle.hil.test_hil_tcp import Px4Client
@@ -169,3 +171,25 @@ def test_ctrl_c_while_waiting_for_ardupilot_ends_in_a_sentence(tmp_path):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 1 and "stopped before ArduPilot's SITL was there" in said
+
+
+@pytest.mark.parametrize("words", [("fly", SQUARE, "--yes"), ("guard",)], ids=lambda words: words[0])
+def test_a_vehicle_whose_packets_are_all_refused_is_told_from_one_that_is_not_there(tmp_path, words):
+    # Given one that does not sign, and a companion with a key
+    key, port, is_over = tmp_path / "key", free_port(), threading.Event()
+    assert run_here("key", "new", key).returncode == 0
+    packet = dialect.MAVLink_heartbeat_message(2, 12, 0x51, 0x30000, 3, 3).pack(dialect.MAVLink(None, 1, 1))
+
+    def vehicle():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
+            while not is_over.wait(0.05):
+                end.sendto(packet, ("127.0.0.1", port))
+
+    thread = threading.Thread(target=vehicle)
+    thread.start()
+    link = ("--connect", f"udpin://127.0.0.1:{port}", "--signing-key", key)
+    quick = ("--set", "companion.link.heartbeat_wait_s=0.5", "--out", tmp_path / "run")
+    done = run_here(*words, *link, *quick)
+    is_over.set()
+    thread.join()
+    assert done.returncode == 1 and "packets were refused: do both ends sign" in done.stdout + done.stderr
