@@ -1,19 +1,22 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
 import math
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from companion.autopilot.known import ASSUMED
 from companion.flight.core import Core
 from companion.flight.machine import FlightCore
 from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
+from companion.flight.rehearsal import rehearsed
 from companion.flight.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
-from companion.messages import ComputerStatus, Sample
+from companion.messages import ComputerStatus, Outgoing, Sample
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport, Status
 
@@ -31,13 +34,25 @@ class StepResult(NamedTuple):
 CoreT = TypeVar("CoreT", bound=Core[Any])
 
 
-class Stepped(Generic[CoreT]):
+class Stepped(ABC, Generic[CoreT]):
     """Joins the codec with a pure core; holds no clock and no socket. Times are microseconds, any epoch."""
 
     def __init__(self, core: CoreT, readers: Mapping[int, Reader] = READERS) -> None:
         self.core = core
         self._decoder, self._encoder = Decoder(readers), Encoder()
         self._has_begun = self._is_addressed = False
+
+    @abstractmethod
+    def _rehearsed(self) -> Iterable[Outgoing]:
+        """What another one like this sends at a hit."""
+
+    def rehearse(self) -> None:
+        """Walk the way of a hit once, before the flight, in which nothing changes by that but how soon the first hit is
+        answered.
+        """
+        encoder = Encoder()
+        for message in self._rehearsed():
+            encoder.packets(message)
 
     def step(self, received: bytes, now_us: int) -> StepResult:
         """Take the bytes received since the last call, or b"" when only time has passed."""
@@ -128,6 +143,9 @@ class Companion(Stepped[FlightCore]):
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(FlightCore(mission))
+
+    def _rehearsed(self) -> Iterable[Outgoing]:
+        return rehearsed(FlightCore(self.core.flight.mission), State.HOLDING, ASSUMED.setpoints)
 
     def confirm_plan(self) -> None:
         """Confirm the plan, also before the first step."""

@@ -184,6 +184,7 @@ def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
     clock = Going(now_us_of(start))
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
     ServiceManager("@nobody", None).go_first()
+    companion.rehearse()
     with undisturbed():
         connection.send(b"\0")
         while True:

@@ -2,21 +2,23 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from typing import Any
 
 from companion.autopilot.known import ASSUMED, defaults
 from companion.companion import Stepped, StepResult
 from companion.flight.core import POLL_INTERVAL_US
+from companion.flight.rehearsal import rehearsed
 from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.machine import GuardCore
+from companion.guard.states import State
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.moves import SETPOINT_IDS, asked_by, is_for, would_move
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.mavlink.readers import GUARD_READERS
-from companion.messages import Asked, SendCommand
+from companion.messages import Asked, Outgoing, SendCommand
 from companion.motion.vector import ZERO, minus, plus
 
 # Setpoints are lost when there is none for so long.
@@ -29,6 +31,9 @@ class Guard(Stepped[GuardCore]):
     def __init__(self, config: GuardConfig) -> None:
         super().__init__(GuardCore(config), GUARD_READERS)
         self._shift_ned_m = ZERO  # of the local frame, when the last setpoint came
+
+    def _rehearsed(self) -> Iterable[Outgoing]:
+        return rehearsed(GuardCore(GuardConfig()), State.WATCHING, ASSUMED.sticks)
 
     def look_at(self, between: Between, now_us: int) -> Iterator[tuple[str, dict[str, Any]]]:
         """After a step: close or open it; what its clients have sent since the last one, kind and numbers."""

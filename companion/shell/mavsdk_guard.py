@@ -71,6 +71,7 @@ class CollisionGuard:
         """Attach, once; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
         if self._is_over or self._thread.ident is not None:
             raise GuardError("This guard was started before: make a new CollisionGuard.")
+        self._guard.rehearse()
         self._link.intercept(self._incoming, self._outgoing)
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))

@@ -159,6 +159,7 @@ class Loop:
         started_us = self.clock.now_us()
         if self.manager is not None:
             self.manager.go_first()
+        self.stepped.rehearse()
         with undisturbed() as allow_collecting:
             try:
                 while not (self.stepped.finished or is_over()):

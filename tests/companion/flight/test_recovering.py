@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from companion.companion import Companion
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.core import Limiter
 from companion.flight.envelope import SetpointError
@@ -13,6 +14,8 @@ from companion.flight.handlers.ending import early_end
 from companion.flight.handlers.recovering import Recover
 from companion.flight.obstacle_map import FlightRoom, all_known
 from companion.flight.states import State
+from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
 from companion.messages import Attitude, AttitudeSetpoint, ImuSample, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
@@ -385,3 +388,13 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
         assert flight.mission.fence.nearest_inside(*place[:2]) == pytest.approx(place[:2], abs=1e-4)
         assert math.hypot(*(sent().velocity_ned_m_s or ZERO)) <= limits.max_speed_m_s + 1e-9
         assert math.hypot(*(sent().acceleration_ned_m_s2 or ZERO)) <= 9.81 * math.tan(math.radians(limits.max_tilt_deg))
+
+
+@pytest.mark.parametrize("who", [Companion(Mission.model_validate(MISSION)), Guard(GuardConfig())])
+def test_a_rehearsed_hit_is_recovered_from_by_attitude_by_another_one(who):
+    # Given one that has heard nothing. When it rehearses, then the other one answers the hit sample by sample
+    said = list(who._rehearsed())
+    assert sum(isinstance(message, AttitudeSetpoint) for message in said) >= 10
+    # And every message of it can be packed, and it has done nothing itself
+    who.rehearse()
+    assert not (who.core.reflex.hits or who.core.flight.events or who.core.flight.outbox)
