@@ -120,7 +120,8 @@ def _watched(rule: Rule, copies: Copies, original: Any) -> Any:
         if copies.me is not None or rule.name in copies.found:
             return found
         other = rule.without(arguments)
-        if other == found or not copies.fork(rule.name):
+        # What is remembered makes a difference whatever is answered.
+        if (other == found and not rule.forget) or not copies.fork(rule.name):
             return found
         rule.take_back(arguments)
         return other

@@ -38,7 +38,7 @@ def run_check(options: Namespace) -> int:
 
 
 def _check(path: Path, options: Namespace) -> None:
-    document = load_mission_document(path, options.set)
+    document = load_mission_document(path, options.set, options.airframe)
     world = world_from(document)
     stand_own(world)
     mission = mission_from(document, world)

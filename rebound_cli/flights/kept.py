@@ -169,7 +169,9 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
 
 def simulated_text(runs: Path) -> str:
     """Where flights of simulated vehicles lie beside those that are told of."""
-    count = sum((folder / run_folder.AIRFRAME_NAME).exists() for folder in runs.iterdir()) if runs.is_dir() else 0
+    # `Path.exists` raises where a folder may not be looked into.
+    airframes = [folder / run_folder.AIRFRAME_NAME for folder in runs.iterdir()] if runs.is_dir() else []
+    count = sum(map(os.path.exists, airframes))
     if count == 0:
         return ""
     what = "flight of a simulated vehicle is" if count == 1 else "flights of simulated vehicles are"

@@ -78,7 +78,8 @@ class AskPerson:
         elif (answer := self._read_answer()) in ("y", "yes"):
             companion.confirm_plan()
         elif answer is not None:
-            companion.stop("the plan was not confirmed")
+            remedy = "" if answer or os.isatty(self._stdin) else "; without a terminal --yes does"
+            companion.stop(f"the plan was not confirmed{remedy}")
 
     def _read_answer(self) -> str | None:
         """The line, None while there is none; the end of input is an empty answer, which means no."""
