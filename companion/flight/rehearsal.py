@@ -20,6 +20,7 @@ from companion.messages import (
     Sample,
 )
 from companion.motion.config import GRAVITY_M_S2
+from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.config import MOST_HELD_S
 
@@ -32,7 +33,7 @@ HIT_M_S2 = -40.0
 
 
 def rehearsed(core: Core[Any], flying: Any, custom_mode: int) -> Iterator[Outgoing]:
-    """What a new core sends for a vehicle that flies in that mode, in the state `flying`, and is hit."""
+    """What a new core sends in the state `flying` to a vehicle that flies in that mode and is hit."""
     flight = core.flight
     for count in range(MET + LEARNT + HIT + RECOVERING):
         if count == MET:
@@ -48,12 +49,12 @@ def _samples(count: int, north_m_s2: float, custom_mode: int) -> list[Sample]:
     imu = ImuSample(us, (north_m_s2, noise, noise - GRAVITY_M_S2), (0.1 * noise, 0.0, 0.0))
     if count % 2:
         return [imu]
-    (quadrotor, *_), level = MULTICOPTERS, (1.0, 0.0, 0.0, 0.0)
+    quadrotor, *_ = MULTICOPTERS
     return [
         imu,
         Heartbeat(1, AUTOPILOT_COMPONENT_ID, quadrotor, ASSUMED.mav_autopilot, True, custom_mode, 4),
         ExtendedState(LandedState.IN_AIR),
         LocalPosition(us, (1e-6 * us * NORTH_M_S, 0.0, DOWN_M), (NORTH_M_S, 0.0, 0.0)),
-        Attitude(us, level, ZERO),
-        AttitudeTarget(us, THRUST, level),
+        Attitude(us, LEVEL, ZERO),
+        AttitudeTarget(us, THRUST, LEVEL),
     ]

@@ -16,6 +16,7 @@ from companion.flight.obstacle_map import FlightRoom, all_known
 from companion.flight.states import State
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
+from companion.mavlink.encode import Encoder
 from companion.messages import Attitude, AttitudeSetpoint, ImuSample, LocalPosition, PositionSetpoint
 from companion.mission.model import Mission
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
@@ -396,5 +397,6 @@ def test_a_rehearsed_hit_is_recovered_from_by_attitude_by_another_one(who):
     said = list(who._rehearsed())
     assert sum(isinstance(message, AttitudeSetpoint) for message in said) >= 10
     # And every message of it can be packed, and it has done nothing itself
+    assert all(Encoder().packets(message) for message in said)
     who.rehearse()
     assert not (who.core.reflex.hits or who.core.flight.events or who.core.flight.outbox)
