@@ -28,6 +28,8 @@ Address: TypeAlias = tuple[str, int]
 # Half of the time for which the last setpoint is flown on, for the silence: a vehicle that has moved is answered within
 # the other half, and streams that fly one come twenty times as often.
 RELEASED_US = defaults.LOSS_US // 2
+# As often it is looked at whether what the pinned address sends is the vehicle's: each time costs a checksum.
+LOOKED_AT_US = RELEASED_US // 10
 
 
 @dataclass(slots=True)
@@ -72,7 +74,8 @@ class Peer:
         if self._only is not None and (sender[0] != self._only[0] or self._only[1] not in (None, sender[1])):
             return False
         if sender == self._pinned:
-            if any(map(self._is_genuine, _packets(datagram))):
+            is_due = self._moved is not None or now_us - self._last_us >= LOOKED_AT_US
+            if is_due and any(map(self._is_genuine, _packets(datagram))):
                 self._last_us, self._moved = now_us, None
             return True
         is_released = self._pinned is None or now_us - self._last_us > RELEASED_US or sender == self._before
