@@ -111,7 +111,7 @@ def test_neither_a_wrong_file_nor_a_page_that_cannot_be_written_hides_another_mi
     assert f"{wrong}:3: items.0.takeoff.height: unknown key" in result.stderr and "Traceback" not in result.stderr
     assert "hand the vehicle to land" in result.stdout
     assert run_here("check").returncode == 1
-    assert "there is no airframe 'none'" in run_here("check", WALL, "--airframe", "none").stderr
+    assert "no airframe is called 'none'" in run_here("check", WALL, "--airframe", "none").stderr
     # Given a file where the folder of the pages is to be, both missions are told, and both pages that nobody has
     result = run_here("check", WALL, ROOT / "missions" / "square.yaml", "--out", wrong)
     assert result.returncode == 1 and "in all 15.5 m" in result.stdout and "square:" in result.stdout
