@@ -141,6 +141,9 @@ class Stepped(ABC, Generic[CoreT]):
         )
 
 
+_REHEARSAL = {"name": "rehearsal", "items": [{"takeoff": {"height_m": 1.5}}, {"land": {}}]}
+
+
 class Companion(Stepped[FlightCore]):
     """Of one flight of a mission."""
 
@@ -148,7 +151,8 @@ class Companion(Stepped[FlightCore]):
         super().__init__(FlightCore(mission))
 
     def _rehearsed(self) -> Iterable[Outgoing]:
-        return rehearsed(FlightCore(self.core.flight.mission), State.HOLDING, ASSUMED.setpoints)
+        # No mission's own policy or fence ends it before the hit.
+        return rehearsed(FlightCore(Mission.model_validate(_REHEARSAL)), State.HOLDING, ASSUMED.setpoints)
 
     def confirm_plan(self) -> None:
         """Confirm the plan, also before the first step."""

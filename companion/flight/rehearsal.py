@@ -24,12 +24,14 @@ from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.config import MOST_HELD_S
 
-# PX4's default of 50 Hz, and a vehicle's usual height, speed and thrust: nothing depends on them.
+# PX4's default of 50 Hz. Height and speed of the shipped missions; a hover's thrust.
 INTERVAL_US, DOWN_M, NORTH_M_S, THRUST = 20_000, -1.5, 1.0, 0.5
-# Samples until it is known that it flies; until the detector has learnt its noise; of the hit; of the recovery.
+# Samples: several of each stream until it is known that it flies; 0.8 s, SETTLED_US and THRUST_LEARNT_S, until hits
+# are looked for and the thrust is known; a hit that has a second sample; some of its recovery.
 MET, LEARNT, HIT, RECOVERING = 12, 40, 2, 10
-# Far above every threshold.
+# Above the largest threshold (StreamHealthConfig.max_threshold_m_s2).
 HIT_M_S2 = -40.0
+ACTIVE = 4  # MAV_STATE_ACTIVE
 
 
 def rehearsed(core: Core[Any], flying: Any, custom_mode: int) -> Iterator[Outgoing]:
@@ -52,7 +54,7 @@ def _samples(count: int, north_m_s2: float, custom_mode: int) -> list[Sample]:
     quadrotor, *_ = MULTICOPTERS
     return [
         imu,
-        Heartbeat(1, AUTOPILOT_COMPONENT_ID, quadrotor, ASSUMED.mav_autopilot, True, custom_mode, 4),
+        Heartbeat(1, AUTOPILOT_COMPONENT_ID, quadrotor, ASSUMED.mav_autopilot, True, custom_mode, ACTIVE),
         ExtendedState(LandedState.IN_AIR),
         LocalPosition(us, (1e-6 * us * NORTH_M_S, 0.0, DOWN_M), (NORTH_M_S, 0.0, 0.0)),
         Attitude(us, LEVEL, ZERO),

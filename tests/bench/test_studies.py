@@ -11,12 +11,15 @@ from bench.faults.catalogue import FLOWN, GROUPS
 from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.packets import ARM, SET_MODE, made, outside
-from bench.studies.ablation import Rule, flights_table, switched
+from bench.studies.ablation import RULES, Rule, flights_table, switched
 from bench.studies.detection.landings import judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
+from companion.motion.vector import ZERO
 from companion.reflex import surface
+from companion.reflex.belief.filter_bank import FilterBank
 from companion.reflex.recovery import attitude_law
+from companion.reflex.surface import MotionState
 from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.faults import motor_failure, other
@@ -141,6 +144,17 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
     assert steps == [("first",), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
     # In the copy the rule is off from its first answer on, in every module that asks it.
     assert copies.found == {"away": {"steps": [["first"], [9, 9, 9], [9, 9, 9]]}}
+    # And every rule is where its row says
+    with switched(RULES):
+        pass
+
+
+def test_a_rule_that_only_remembers_is_left_out_although_it_answers_nothing():
+    bank = FilterBank(MotionState(ZERO, (1.0, 0.0, 0.0)), 0.1, ZERO, 0)
+    with switched([rule for rule in RULES if rule.name == "leaves"]) as copies:
+        bank.leave((-1.0, 0.0, 0.0), 0.0, 0.1)
+        copies.leave(lambda: bank.leaves.max())
+    assert copies.found["leaves"] == 1.0 > bank.leaves.max()
 
 
 def test_the_table_counts_what_is_lost_without_a_rule():

@@ -28,7 +28,8 @@ Address: TypeAlias = tuple[str, int]
 # Half of the time for which the last setpoint is flown on, for the silence: a vehicle that has moved is answered within
 # the other half, and streams that fly one come twenty times as often.
 RELEASED_US = defaults.LOSS_US // 2
-# As often it is looked at whether what the pinned address sends is the vehicle's: each time costs a checksum.
+# As often it is looked at whether what the pinned address sends is the vehicle's, which costs a checksum: its silence
+# is known to a tenth.
 LOOKED_AT_US = RELEASED_US // 10
 
 

@@ -391,7 +391,15 @@ def test_what_is_added_for_the_vehicles_errors_stays_inside_fence_and_limits_or_
         assert math.hypot(*(sent().acceleration_ned_m_s2 or ZERO)) <= 9.81 * math.tan(math.radians(limits.max_tilt_deg))
 
 
-@pytest.mark.parametrize("who", [Companion(Mission.model_validate(MISSION)), Guard(GuardConfig())])
+# Whatever the mission's own policies and laws are
+HASTY = MISSION | {
+    "on_collision": {"hold_s": 0.1},
+    "fence": {"radius_m": 3, "max_height_m": 2.5},
+    "recovery": {"law": "paper"},
+}
+
+
+@pytest.mark.parametrize("who", [Companion(Mission.model_validate(HASTY)), Guard(GuardConfig())])
 def test_a_rehearsed_hit_is_recovered_from_by_attitude_by_another_one(who):
     # Given one that has heard nothing. When it rehearses, then the other one answers the hit sample by sample
     said = list(who._rehearsed())
