@@ -125,7 +125,7 @@ class Core(ABC, Generic[FlightT]):
             if not PLACES.isdisjoint(kinds):
                 samples = self._in_one_frame(samples, now_us)
             refusal = self._hear(samples, now_us)
-            note_height(flight)
+            note_height(flight, now_us)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
             history = flight.vehicle.history
