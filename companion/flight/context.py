@@ -130,7 +130,7 @@ class FlightContext:
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
-    foreign_mode_since_us: int | None = None  # when the mode was first not ours, though perhaps nobody decided it
+    foreign_mode: Lasting = field(default_factory=Lasting)  # not ours, by trajectory_us; perhaps nobody decided it
     armed_at_us: int | None = None
     steps: tuple[Step, ...] = field(init=False)
     step_index: int = 0  # the one that is flown, or is to be flown next
