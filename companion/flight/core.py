@@ -186,7 +186,7 @@ class Core(ABC, Generic[FlightT]):
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
         flight = self.flight
         self.handler = Released(flight, self.now_us)
-        if self.stopping in self.table[self.state] or flight.outcome is None:
+        if flight.outcome is None:
             self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
     def _take(self, transition: Transition, now_us: int) -> bool:
