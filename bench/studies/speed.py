@@ -30,7 +30,7 @@ from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
-from companion.shell.connections.connection import udp_out
+from companion.shell.connections.addresses import open_connection
 from companion.shell.service_manager import ServiceManager
 from rebound_cli.background import Background
 from rebound_cli.inputs.inputs import load_mission_document, mission_from, world_from
@@ -179,7 +179,7 @@ def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
     companion.confirm_plan()
     for interval in range(start):
         companion.step(flight.said[interval], now_us_of(interval))
-    connection = udp_out("127.0.0.1", port)
+    connection = open_connection(f"udpout://127.0.0.1:{port}")
     recorder = FlightRecorder(folder, Background("log"))
     clock = Going(now_us_of(start))
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())

@@ -53,8 +53,7 @@ class Core(ABC, Generic[FlightT]):
         self._sample_boot_us = 0
         self._sent: Target | None = None  # as last sent, in the vehicle's view
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
-        # What the vehicle is told of it, until it has answered; and whether it is known.
-        self._law, self._is_met = CommandClient(), False
+        self._law = CommandClient()  # what the vehicle is told of it, until it has answered
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
         self.begin(0)
@@ -75,9 +74,12 @@ class Core(ABC, Generic[FlightT]):
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> tuple[list[Outgoing], list[Event]]:
         """One step: update from the samples, detect hits, run the state machine, send what is due."""
-        self.now_us = now_us
+        self.now_us, known = now_us, self.flight.vehicle.identity
         moved = self._react(samples, now_us)
-        if self._law.pending is not None or not self._is_met:
+        if known is None and self.flight.vehicle.identity is not None:
+            # A vehicle that is met hears of it first: a companion may have died before.
+            self._change_law(self._leans, now_us, is_new=True)
+        elif self._law.pending is not None:
             self._repeat_law(samples, now_us)
         self._stream_setpoint(moved, now_us)
         flight = self.flight
@@ -125,7 +127,7 @@ class Core(ABC, Generic[FlightT]):
             if not PLACES.isdisjoint(kinds):
                 samples = self._in_one_frame(samples, now_us)
             refusal = self._hear(samples, now_us)
-            note_height(flight)
+            note_height(flight, now_us)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
             history = flight.vehicle.history
@@ -165,9 +167,7 @@ class Core(ABC, Generic[FlightT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        is_blind = self.reflex.monitor.no_data_reason is not None
-        if is_blind or flight.blind.since_us is not None:
-            flight.blind.update(is_blind, now_us)
+        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:
@@ -186,7 +186,7 @@ class Core(ABC, Generic[FlightT]):
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
         flight = self.flight
         self.handler = Released(flight, self.now_us)
-        if self.stopping in self.table[self.state] or flight.outcome is None:
+        if flight.outcome is None:
             self.state, flight.outcome, flight.reason = self.failed, "failed", text
 
     def _take(self, transition: Transition, now_us: int) -> bool:
@@ -258,17 +258,13 @@ class Core(ABC, Generic[FlightT]):
             self._repeat_law((), now_us)
 
     def _repeat_law(self, samples: Sequence[Sample], now_us: int) -> None:
-        """Until the vehicle has answered. It hears of it first when it is met: a companion may have died before."""
-        if not self._is_met and self.flight.vehicle.identity is not None:
-            self._is_met = True
-            self._change_law(self._leans, now_us, is_new=True)
-        elif self._law.pending is not None:
-            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-            send, outcome = self._law.step(acks, False, now_us)
-            if send is not None:
-                self.flight.outbox.append(send)
-            if outcome is not None and not outcome.succeeded:
-                self.flight.report(now_us, "command", outcome.text)
+        """Until the vehicle has answered."""
+        acks = [sample for sample in samples if isinstance(sample, CommandAck)]
+        send, outcome = self._law.step(acks, False, now_us)
+        if send is not None:
+            self.flight.outbox.append(send)
+        if outcome is not None and not outcome.succeeded:
+            self.flight.report(now_us, "command", outcome.text)
 
     @property
     def last_words(self) -> tuple[tuple[float, Outgoing], ...]:

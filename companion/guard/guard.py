@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from typing import Any
 
-from companion.autopilot.known import ASSUMED, defaults
+from companion.autopilot.known import ASSUMED
 from companion.companion import Stepped, StepResult
 from companion.flight.core import POLL_INTERVAL_US
 from companion.flight.rehearsal import rehearsed
@@ -14,15 +14,13 @@ from companion.guard.between import Between
 from companion.guard.config import GuardConfig
 from companion.guard.machine import GuardCore
 from companion.guard.states import State
+from companion.guard.watching import OTHERS_STOPPED_US
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.moves import SETPOINT_IDS, asked_by, is_for, would_move
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.mavlink.readers import GUARD_READERS
 from companion.messages import Asked, Outgoing, SendCommand
 from companion.motion.vector import ZERO, minus, plus
-
-# Setpoints are lost when there is none for so long.
-LONGEST_BETWEEN_S = defaults.LOSS_US * 1e-6
 
 
 class Guard(Stepped[GuardCore]):
@@ -67,7 +65,7 @@ class Guard(Stepped[GuardCore]):
         place, velocity = asked.place_ned_m, asked.velocity_ned_m_s
         if place is not None:
             place = minus(place, shift)
-            if velocity is None and before is not None and 0.0 < since_s < LONGEST_BETWEEN_S:
+            if velocity is None and before is not None and 0.0 < since_s < OTHERS_STOPPED_US * 1e-6:
                 moves = plus(ZERO, 1.0 / since_s, minus(place, before))
                 # What goes faster than a vehicle is the next place, and no motion.
                 velocity = moves if math.hypot(*moves) <= guard.mission.limits.max_speed_m_s else None

@@ -122,7 +122,7 @@ class GiveBack(GiveAway[GuardContext]):
             return Transition(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
         guard.ask_for_mode(self.wish)
         # The answers of this step were to the mode before.
-        return self.step(guard, Inputs(positions=inputs.positions), now_us)
+        return self.step(guard, Inputs(), now_us)
 
 
 class StandDown(Handler[GuardContext]):

@@ -162,10 +162,9 @@ class VelocityItem(StrictModel):
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
-        speed_m_s = sum(component**2 for component in self.velocity_ned_m_s) ** 0.5
         most_m_s = defaults.MAX_SPEED_M_S
-        if not 0.0 < speed_m_s <= most_m_s:
-            raise ValueError(f"velocity_ned_m_s: {speed_m_s:g} m/s is not above 0 and at most {most_m_s:g}")
+        if not 0.0 < self.speed_m_s <= most_m_s:
+            raise ValueError(f"velocity_ned_m_s: {self.speed_m_s:g} m/s is not above 0 and at most {most_m_s:g}")
         return self
 
     @property

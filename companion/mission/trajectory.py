@@ -191,7 +191,7 @@ class CurveProfile:
         spline = _Spline(knots, points)
         steps = int(np.clip(2.0 * chords.sum() / _STEP_M, 50, _MOST_STEPS))
         u = np.linspace(0.0, knots[-1], steps + 1)
-        first = spline.first(u)
+        _, first, _ = spline(u)
         rate = np.maximum(np.linalg.norm(first, axis=1), _LEAST_RATE)
         pieces_m = 0.5 * (rate[1:] + rate[:-1]) * np.diff(u)
         along_m = np.concatenate([[0.0], np.cumsum(pieces_m)])
@@ -261,18 +261,10 @@ class _Spline:
 
     def __call__(self, u: Floats) -> tuple[Floats, Floats, Floats]:
         """Places (m, 3), their first and their second derivatives."""
-        x, (a, b, c, d) = self._on_piece(u)
-        return a + x * (b + x * (c + x * d)), b + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d
-
-    def first(self, u: Floats) -> Floats:
-        """The first derivative alone, as a long path has many places."""
-        x, (_, b, c, d) = self._on_piece(u)
-        return np.asarray(b + x * (2.0 * c + 3.0 * x * d))
-
-    def _on_piece(self, u: Floats) -> tuple[Floats, Floats]:
-        """From where on its piece each is, and that piece's coefficients."""
         piece = np.clip(np.searchsorted(self._knots, u, side="right") - 1, 0, len(self._knots) - 2)
-        return (u - self._knots[piece])[:, None], self._pieces[:, piece]
+        # From where on its piece each is, and that piece's coefficients.
+        x, (a, b, c, d) = (u - self._knots[piece])[:, None], self._pieces[:, piece]
+        return a + x * (b + x * (c + x * d)), b + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d
 
 
 # Where to be when, from rest to rest: how long the way is, how long it takes, where it ends, and the motion at a time.

@@ -8,8 +8,9 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.errors import AddressError
 from companion.guard.between import Between
+from companion.shell.connections.addresses import open_connection
 from companion.shell.connections.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
-from companion.shell.connections.connection import bound_socket, udp_out
+from companion.shell.connections.connection import bound_socket
 from tests.clients.simulator import free_port
 
 HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
@@ -30,7 +31,7 @@ class Bench:
         urls = [f"{scheme}://{LOOPBACK}:{port}" for scheme, port in zip(schemes, self.ports, strict=True)]
         self.between = Between(carried_bytes_s("udpout://127.0.0.1:1"))
         self._ends: list[socket.socket] = [self.vehicle]
-        remote = udp_out(LOOPBACK, self.vehicle.getsockname()[1])
+        remote = open_connection(f"udpout://{LOOPBACK}:{self.vehicle.getsockname()[1]}")
         self.shared = SharedConnection(remote, urls, self.between)
         self.shared.send(packet(1))
         _, self.guard = self.vehicle.recvfrom(300)
@@ -168,7 +169,7 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
     ],
 )
 def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
-    vehicle = udp_out(LOOPBACK, 1)
+    vehicle = open_connection(f"udpout://{LOOPBACK}:1")
     with pytest.raises(AddressError, match=says):
         SharedConnection(vehicle, [url], Between(1.0))
 

@@ -7,7 +7,7 @@ from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Ta
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS, CommandOutcome
 from companion.link.vehicle import OLD_NEWS_US
-from companion.messages import DISARM, LandedState, Vector3
+from companion.messages import DISARM, LandedState
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
 ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
@@ -38,8 +38,7 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     if reason is None and inputs.positions and flight.armed_at_us is not None:
         reason = _outside_fence(flight)
         if reason is None:
-            abort = _abort_reason(flight, state, flight.reflex.place_ned_m(flight.latest), now_us)
-            reason = _once_clear(flight, state, abort, now_us)
+            reason = _once_clear(flight, state, _abort_reason(flight, state, now_us), now_us)
     return None if reason is None else Transition(Trigger.INTERRUPTED, reason)
 
 
@@ -82,9 +81,8 @@ def _may_be_down(flight: FlightContext) -> bool:
         return False
     if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
         return True
-    if flight.foreign_mode_since_us is None:
-        flight.foreign_mode_since_us = flight.trajectory_us
-    return flight.trajectory_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
+    flight.foreign_mode.update(True, flight.trajectory_us)
+    return flight.foreign_mode.lasts_us <= DISARM_NEWS_US
 
 
 def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition | None:
@@ -131,7 +129,7 @@ def _outside_fence(flight: FlightContext) -> str | None:
     return f"the vehicle is {outside_m:.2f} m outside the fence" if outside_m > most_m else None
 
 
-def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
+def _abort_reason(flight: FlightContext, state: State, now_us: int) -> str | None:
     when = flight.mission.abort_when
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
@@ -139,7 +137,7 @@ def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now
     if when.blind_for_s is not None and flight.blind.lasts_us > when.blind_for_s * 1e6:
         return f"the detector has been blind for {when.blind_for_s:g} s"
     if when.setpoint_missed_by_m is not None and state in FOLLOWING and flight.target is not None:
-        missed_m = math.dist(place_ned_m, flight.target.position_ned_m)
+        missed_m = math.dist(flight.reflex.place_ned_m(flight.latest), flight.target.position_ned_m)
         if missed_m > when.setpoint_missed_by_m:
             return f"the vehicle is {missed_m:.2f} m from its setpoint"
     return battery_complaint(flight)
@@ -179,16 +177,15 @@ def taken_by(flight: FlightContext, requested_mode: int | None, others: str) -> 
     """
     holder, report = who_decided(flight, requested_mode), flight.vehicle.mode
     if holder is None or report is None:
-        flight.foreign_mode_since_us = None
+        flight.foreign_mode.update(False, flight.trajectory_us)
         return None
     autopilot = flight.vehicle.autopilot
     is_late = autopilot.wants_setpoints_first and autopilot.setpoints in (flight.expected_mode, requested_mode)
     is_late &= report.intended_custom_mode in (None, autopilot.setpoints)
     is_low = flight.height_m is not None and flight.height_m < flight.mission.companion.min_detection_height_m
     if holder == "failsafe" and is_late and not is_low:
-        if flight.foreign_mode_since_us is None:
-            flight.foreign_mode_since_us = flight.trajectory_us
-        if flight.trajectory_us - flight.foreign_mode_since_us < RETURNS_US:
+        flight.foreign_mode.update(True, flight.trajectory_us)
+        if flight.foreign_mode.lasts_us < RETURNS_US:
             return None
     return f"{'a failsafe of the vehicle' if holder == 'failsafe' else others} took over in {flight.vehicle.mode_name}"
 

@@ -235,8 +235,6 @@ class RecoverInOffboard(Recover[FlightContext]):
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         super().__init__(flight, now_us)
         offboard = flight.vehicle.autopilot.setpoints
-        # It flies setpoints, and nothing else is asked for.
-        self._is_taken = flight.own_modes == (offboard, None)
         # Of a second hit the first one's request may be on its way.
         is_asked = flight.command_client.requested_mode == offboard
         self._ask_us = now_us + (0 if is_asked or flight.expected_mode == offboard else LEAD_US)
@@ -244,8 +242,9 @@ class RecoverInOffboard(Recover[FlightContext]):
             flight.count_asked_mode()
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        if not self._is_taken and now_us >= self._ask_us:
-            offboard = flight.vehicle.autopilot.setpoints
+        offboard = flight.vehicle.autopilot.setpoints
+        is_taken = flight.own_modes == (offboard, None)  # it flies setpoints, and nothing else is asked for
+        if not is_taken and now_us >= self._ask_us:
             if flight.command_client.requested_mode != offboard:
                 flight.ask_for_mode(offboard)
             outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
@@ -253,5 +252,5 @@ class RecoverInOffboard(Recover[FlightContext]):
                 text = f"no recovery from a hit in the landing: {outcome.text}"
                 return Transition(Trigger.INTERRUPTED, text, is_left=True)
             if outcome is not None:
-                self._is_taken, flight.expected_mode = True, offboard
+                flight.expected_mode = offboard
         return super().step(flight, inputs, now_us)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from companion.errors import AddressError, ConnectionSetupError
 from companion.mavlink.signing import Signing
-from companion.shell.connections.connection import ANY_HOST, UdpConnection, resolve, udp_in, udp_out
+from companion.shell.connections.connection import ANY_HOST, UdpConnection, resolve, udp_in
 from companion.shell.connections.peer import Peer
 from companion.shell.connections.streams import SerialConnection, StreamConnection, TcpInConnection, tcp_out
 
@@ -54,8 +54,11 @@ def open_connection(url: str, peer: str | None = None, signing: Signing | None =
             return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), signing))
         case "tcpin":
             return TcpInConnection(host, port)
-    one_host(address)
-    return udp_out(host, port) if scheme == "udpout" else tcp_out(host, port, waits)
+    family, remote = one_host(address)
+    if scheme == "tcpout":
+        return tcp_out(host, port, waits)
+    # Whoever listens there with one socket, as PX4, mavlink-router, MAVSDK and mavutil do, answers from that port.
+    return UdpConnection(socket.socket(family, socket.SOCK_DGRAM), Peer(remote[:2]), remote)
 
 
 def parsed(url: str) -> Endpoint:

@@ -96,15 +96,6 @@ def udp_in(host: str, port: int, peer: Peer | None = None) -> UdpConnection:
     return UdpConnection(bound_socket(socket.SOCK_DGRAM, host, port), peer or Peer())
 
 
-def udp_out(host: str, port: int) -> UdpConnection:
-    """Sends to one remote address from a port of its own, and hears that address alone.
-
-    Whoever listens there with one socket, as PX4, mavlink-router, MAVSDK and mavutil do, answers from that port.
-    """
-    family, address = resolve(host, port)
-    return UdpConnection(socket.socket(family, socket.SOCK_DGRAM), Peer(address[:2]), address)
-
-
 def resolve(host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC) -> tuple[socket.AddressFamily, Any]:
     """Family and address of a host. On a socket of IPv6 one that has only IPv4 is seen by its mapped address."""
     mapped = socket.AI_V4MAPPED if family == socket.AF_INET6 else 0
