@@ -31,7 +31,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     policy = own or flight.mission.on_collision
     hits = recoveries_from(flight.collisions[-flight.tally.hits :] if own else flight.collisions)
     then, reason = _verdict(flight, policy, hits, own)
-    if then == "retry" and state is State.MISSION:
+    if then == "retry" and state in (State.TAKEOFF, State.MISSION):
         flight.tally.pace_factor *= policy.retry_speed_factor
     flight.after_recovery = Transition(Trigger(f"settled, then: {then}"), reason)
     # What an interrupted flight resumes with.

@@ -43,8 +43,12 @@ class SpeedLimits:
     def limits(self, item: items.Motion | items.ReturnItem) -> tuple[float, float, float]:
         """Speed and acceleration, the item's or the present ones; and the acceleration while the speed grows."""
         speed_m_s = item.speed_m_s or self.speed_m_s
-        slowed_m_s = max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
-        return slowed_m_s, getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
+        return slowed_m_s(speed_m_s, self.factor), getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
+
+
+def slowed_m_s(speed_m_s: float, factor: float) -> float:
+    """Of an item that is tried again."""
+    return max(speed_m_s * factor, min(speed_m_s, LEAST_TRY_M_S))
 
 
 def stay(place_m: Vector3) -> LineProfile:

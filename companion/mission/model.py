@@ -17,7 +17,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.item_trajectory import Planned, SpeedLimits, home_around, stay, trajectory_around
+from companion.mission.item_trajectory import Planned, SpeedLimits, home_around, slowed_m_s, stay, trajectory_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, OnCollision, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -65,10 +65,10 @@ class Mission(StrictModel):
         speed_m_s = min(flight.cruise_speed_m_s, self.limits.max_speed_m_s)
         return SpeedLimits(speed_m_s, flight.cruise_acceleration_m_s2, speeding_up_m_s2=flight.speeding_up_m_s2)
 
-    def climb(self, start_ned_m: Vector3, height_m: float) -> LineProfile:
-        """Straight up."""
+    def climb(self, start_ned_m: Vector3, height_m: float, factor: float = 1.0) -> LineProfile:
+        """Straight up, with that factor of the speed."""
         flight, top_ned_m = self.companion.flight, (start_ned_m[0], start_ned_m[1], -height_m)
-        speed_m_s = min(flight.takeoff_speed_m_s, self.limits.max_speed_m_s)
+        speed_m_s = slowed_m_s(min(flight.takeoff_speed_m_s, self.limits.max_speed_m_s), factor)
         return LineProfile(start_ned_m, top_ned_m, speed_m_s, flight.takeoff_acceleration_m_s2)
 
     @model_validator(mode="after")

@@ -57,8 +57,10 @@ class FlyItems(_OnTrajectory):
     def _begin(self, flight: FlightContext, now_us: int) -> None:
         """Begin the present step: a trajectory (of no length for a hold) and a heading."""
         assert flight.target is not None and flight.origin_ned_m is not None, "the flight is in the air"
-        if flight.tally.index != flight.step_index or flight.tally.began_us is None:
-            flight.tally = StepTally(flight.step_index, now_us)
+        if flight.tally.index != flight.step_index:
+            flight.tally = StepTally(flight.step_index)
+        if flight.tally.began_us is None:
+            flight.tally.began_us = now_us
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
         self._action = step.action
         self._trajectory_began_us = flight.trajectory_us
@@ -72,12 +74,12 @@ class FlyItems(_OnTrajectory):
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
-                self._trajectory = flight.mission.climb(start, self._action.height_m)
+                self._trajectory = flight.mission.climb(start, self._action.height_m, flight.tally.pace_factor)
             case items.WaitForItem(file=file):
                 flight.file_awaited = file
             case items.SetSpeedItem():
                 flight.speeds = flight.speeds.changed_to(self._action)
-        factor = flight.tally.pace_factor if isinstance(self._action, items.Motion) else 1.0
+        factor = flight.tally.pace_factor if isinstance(self._action, items.Motion | items.TakeoffItem) else 1.0
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
