@@ -142,8 +142,7 @@ class FusedDetector:
 
     def initial(self) -> FusedState:
         side, vertical = self._config.side_threshold_m_s2, self._config.vertical_threshold_m_s2
-        turn = RateJump(limit=self._config.rate_step_rad_s)
-        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, turn=turn)
+        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical)
 
     def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
