@@ -196,7 +196,6 @@ class FusedDetector:
         is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio), is_shown_twice=is_twice)
         if s.phase is Phase.OFF:
-            s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
         return self._loud(s, situation, motion, impact, f)
@@ -266,7 +265,7 @@ class FusedDetector:
 
     def _fire(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact:
         """A hit that is looked for."""
-        s.phase, s.observed, s.last_loud_boot_us = Phase.CONTACT, None, impact.sample_time_boot_us
+        s.phase, s.last_loud_boot_us = Phase.CONTACT, impact.sample_time_boot_us
         return self._begun(s, classified(impact, s.velocity_ned_m_s, situation, motion))
 
     def _begun(self, s: FusedState, impact: Impact) -> Impact:
