@@ -21,8 +21,6 @@ from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex import config as reflex
 from companion.reflex.detection.detector import Innovation
 
-_MEMORY_US = 1e6 * reflex.MEMORY_S
-
 
 @dataclass(slots=True)
 class RateJump(Innovation):
@@ -68,7 +66,7 @@ class RateJump(Innovation):
         size = self.value = math.hypot(i, j, k)
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
-        self.variance_rad2_s2 += was_us / (_MEMORY_US + was_us) * (learnt * learnt - self.variance_rad2_s2)
+        self.variance_rad2_s2 += was_us / (1e6 * reflex.MEMORY_S + was_us) * (learnt * learnt - self.variance_rad2_s2)
         if size >= self.shown * limit or not 0 <= time_us - self.shown_us <= SHOWN_US:
             self.shown, self.shown_us = size / limit, time_us
 
