@@ -254,7 +254,7 @@ class MotionEstimator:
     @property
     def is_measured_apart(self) -> bool:
         """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
-        if self._measured is None or self.is_fully_measured or self._has_agreed:
+        if self._measured is None or self._is_right:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < numbers.CURRENT_US
 
