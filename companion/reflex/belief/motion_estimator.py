@@ -207,9 +207,9 @@ class MotionEstimator:
         now_us, summed = self._time_boot_us, self._summed_m_s
         # It begins with what was expected: reports may be wrong in a way that no model has.
         expected = plus(self.start.velocity_ned_m_s, 1.0, summed)
-        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2)
+        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2, self.hit_boot_us)
         known.predict(now_us, self._summed_m_s)
-        since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
+        since_s = 1e-6 * (now_us - known.taken_boot_us)
         was_odd, self._was_odd = self._was_odd, known.update(doppler, self._was_odd)
         if self._was_odd and not was_odd:
             return
