@@ -95,7 +95,7 @@ class MeasuredVelocity:
     summed_m_s: Vector3  # the accelerometer's integral up to its time
     velocity_ned_m_s: Vector3
     variance_m2_s2: float  # of v on an axis
-    taken_boot_us: int = -1  # when the newest of its velocities was measured
+    taken_boot_us: int  # the newest of its velocities was measured later than this
     unseen_m_s2: Vector3 = ZERO
     both_m2_s3: float = 0.0  # covariance of v and b
     unseen_variance_m2_s4: float = numbers.LEVEL_SPREAD_M_S2**2

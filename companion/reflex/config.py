@@ -274,9 +274,8 @@ class FusedConfig(StrictModel):
     longest_contact_s: Positive = 0.5
     """Longest contact. Longer loud than this is no contact but a new way to shake, and is learnt."""
     soft_m_s2: Positive = 8.0
-    """Below this, on a hovering vehicle, a force may be a hand. A hand is slower than an obstacle: below `soft_m_s2` on
-    a hovering vehicle wait for the force to show itself, for so long at most; a force that jumps is no hand's (see
-    `fused`)."""
+    """Below this, on a hovering vehicle, a force may be a hand. A hand is slower than an obstacle: a force that jumps
+    is no hand's (see `fused`)."""
     soft_wait_s: Positive = 0.02
     """How long such a force is looked at."""
 

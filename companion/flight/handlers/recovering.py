@@ -57,7 +57,7 @@ class Recover(Handler[FlightT]):
             if transition is not None:
                 return transition
             self._tell(flight, shown, now_us)
-            if shown.settled_s is not None:
+            if self._hit.settled_after_s is not None:
                 return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit.detected_at_us > timeout_s * 1e6:
@@ -67,7 +67,7 @@ class Recover(Handler[FlightT]):
         return None
 
     def _tell(self, flight: FlightT, shown: Progress, now_us: int) -> None:
-        place = self._hit.setpoint_ned_m
+        place, settled_s = self._hit.setpoint_ned_m, self._hit.settled_after_s
         if shown.rested_s is not None:
             text = f"at rest; by position from here on, {shown.rested_s:.2f} s after the hit"
             flight.report(now_us, "hand_over", text, after_s=shown.rested_s, recovery_setpoint_ned_m=place)
@@ -76,11 +76,11 @@ class Recover(Handler[FlightT]):
             way = "away from" if round(off_m_s, 2) >= 0.0 else "towards"
             text = f"{way} the obstacle at {abs(off_m_s):.2f} m/s; recovery setpoint {goal}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
-        if shown.settled_s is not None:
+        if settled_s is not None:
             past_m, speed_m_s = self._hit.overshoot_m, self._hit.rebound_speed_m_s
-            text = f"recovered: settled {shown.settled_s:.2f} s after the hit, overshoot {past_m * 100:.1f} cm"
+            text = f"recovered: settled {settled_s:.2f} s after the hit, overshoot {past_m * 100:.1f} cm"
             text += "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
-            flight.report(now_us, "recovered", text, settled_after_s=shown.settled_s, overshoot_m=past_m)
+            flight.report(now_us, "recovered", text, settled_after_s=settled_s, overshoot_m=past_m)
 
     def _leave(self, flight: FlightT) -> Transition:
         """What follows begins at rest at the setpoint."""

@@ -32,8 +32,6 @@ _POLES = np.array([_TURN_RAD_S - 0.5 * _SWING, -_TURN_RAD_S - 0.5 * _SWING, np.f
 _WAYS = _POLES * (_LATE_S * _POLES + 1.0) / (3.0 * _POLES**2 + 2.0 * _K * _POLES + _H)
 _MODES = np.array([_WAYS, (_POLES + _K) * _WAYS])
 
-MODELS = len(_RAD_S)
-
 
 def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit."""
@@ -71,7 +69,7 @@ class FilterBank:
         `summed_m_s`: the accelerometer's integral until then.
         """
         self.time_boot_us, self._summed_m_s = time_boot_us, summed_m_s
-        models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
+        models, state = len(_RAD_S), np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))

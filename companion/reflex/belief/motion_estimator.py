@@ -207,9 +207,9 @@ class MotionEstimator:
         now_us, summed = self._time_boot_us, self._summed_m_s
         # It begins with what was expected: reports may be wrong in a way that no model has.
         expected = plus(self.start.velocity_ned_m_s, 1.0, summed)
-        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2)
+        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2, self.hit_boot_us)
         known.predict(now_us, self._summed_m_s)
-        since_s = 1e-6 * (now_us - max(known.taken_boot_us, self.hit_boot_us))
+        since_s = 1e-6 * (now_us - known.taken_boot_us)
         was_odd, self._was_odd = self._was_odd, known.update(doppler, self._was_odd)
         if self._was_odd and not was_odd:
             return
@@ -254,7 +254,7 @@ class MotionEstimator:
     @property
     def is_measured_apart(self) -> bool:
         """Whether a receiver shows the velocity, and the vehicle's own is another, which it puts right by itself."""
-        if self._measured is None or self.is_fully_measured or self._has_agreed:
+        if self._measured is None or self._is_right:
             return False
         return self._time_boot_us - self._measured.taken_boot_us < numbers.CURRENT_US
 

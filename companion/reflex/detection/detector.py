@@ -80,7 +80,7 @@ class Motion:
     @property
     def answered(self) -> list[MotionEstimator]:
         """Those of collisions with a recovery: if the newest was none, the one before counts."""
-        return [each for each in self.followed if each.is_answered][-2:]
+        return [each for each in self.followed if each.is_answered]
 
     @property
     def is_valid(self) -> bool:

@@ -55,7 +55,7 @@ class FusedState(DetectorState):
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
-    jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
+    jump: VelocityJump = field(default_factory=VelocityJump)
     velocity_ned_m_s: Vector3 | None = None
     moved_boot_us: int = 0
     hovered_boot_us: int | None = None
@@ -142,8 +142,7 @@ class FusedDetector:
 
     def initial(self) -> FusedState:
         side, vertical = self._config.side_threshold_m_s2, self._config.vertical_threshold_m_s2
-        jump, turn = VelocityJump(self._averaging_us), RateJump(limit=self._config.rate_step_rad_s)
-        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical, turn=turn, jump=jump)
+        return FusedState(threshold_m_s2=side, vertical_threshold_m_s2=vertical)
 
     def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
@@ -197,7 +196,6 @@ class FusedDetector:
         is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio), is_shown_twice=is_twice)
         if s.phase is Phase.OFF:
-            s.observed = None
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
         return self._loud(s, situation, motion, impact, f)
@@ -267,7 +265,7 @@ class FusedDetector:
 
     def _fire(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact) -> Impact:
         """A hit that is looked for."""
-        s.phase, s.observed, s.last_loud_boot_us = Phase.CONTACT, None, impact.sample_time_boot_us
+        s.phase, s.last_loud_boot_us = Phase.CONTACT, impact.sample_time_boot_us
         return self._begun(s, classified(impact, s.velocity_ned_m_s, situation, motion))
 
     def _begun(self, s: FusedState, impact: Impact) -> Impact:
@@ -296,10 +294,13 @@ class FusedDetector:
         step = jump.step_m_s(strapdown.fixes)
         if step is None:
             return None
+        # Vibration between the samples, of whose newest interval an averaging window covers a part.
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
+        unseen_share = max(0.0, 1.0 - self._averaging_us / max(s.turn.over_us, 1))
+        unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
-        size, least = math.hypot(*step), jump.least_m_s(config, caution, shaking_m_s2, s.turn.over_us)
+        size, least = math.hypot(*step), jump.least_m_s(config, caution) + unseen_m_s
         corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit

@@ -115,10 +115,10 @@ def promise_of(
     """
     side_m_s2 = state.floor.side_m_s2
     per_hour = alarms_per_h(state.threshold_m_s2 / side_m_s2 if side_m_s2 > 0.0 else math.inf, imu_hz)
-    if not state.jump.known or len(fixes) < 2:
+    if len(fixes) < 2:
         return Promise(state.threshold_m_s2, math.inf, per_hour)
     caution = 1.0 if resets_are_counted else 2.0
-    jump_m_s = state.jump.least_m_s(config, caution, 0.0, 0)
+    jump_m_s = state.jump.least_m_s(config, caution)
     per_step = 0.0
     if state.jump.variance_m2_s2 > 0.0:
         r = jump_m_s / math.sqrt(state.jump.variance_m2_s2)

@@ -21,7 +21,6 @@ class ContactForce:
     free_frd_m_s2: Vector3  # the accelerometer's value without the contact
     averaging_us: int
     range_m_s2: float
-    came_ned_m_s: Vector3 = ZERO  # v_c
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)  # in samples above the threshold
     is_clipped: bool = False
@@ -48,15 +47,15 @@ class ContactForce:
             share = min(1.0, first_m_s2 / second_m_s2) if second_m_s2 > 0.0 else 1.0
             self.begun_boot_us = sample.time_boot_us - elapsed_us - round(share * self.averaging_us)
 
-    def is_fully_measured(self, is_over: bool) -> bool:
-        """Whether the force so far was measured without clipping, as far as the samples show."""
+    def is_fully_measured(self, is_over: bool, came_ned_m_s: Vector3) -> bool:
+        """Whether the force so far was measured without clipping, as far as the samples and v_c show."""
         if self.is_clipped:
             return False
         largest = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
         least = 0.5 * along(largest, largest)
         lasting = sum(along(force, largest) >= least for force in self.forces_ned_m_s2)
         impulse_m_s = self.impulse_ned_m_s
-        off_m_s = along(plus(self.came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
+        off_m_s = along(plus(came_ned_m_s, 1.0, impulse_m_s), unit(impulse_m_s))
         # One that is over and has not even stopped the vehicle's way into it lacks some: a chattering frame's pulses
         # are short, and each is clipped.
         return lasting > SHORT and not (is_over and off_m_s < -SAME_M_S)
@@ -129,7 +128,7 @@ class ImpactEstimator(Motion):
             place = plus(latest.position_ned_m, 1e-6 * (free_until_us - latest.time_boot_us), velocity)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        self.contact = self._contact_force(impact, velocity)
+        self.contact = self._contact_force(impact)
         normal = normal_of(force_ned, velocity, self.hides_clipping)
         if impact.evidence is Evidence.RATE_JUMP:
             # Of the way that the vehicle came.
@@ -165,14 +164,14 @@ class ImpactEstimator(Motion):
         after.note_contact(estimate.is_fully_measured, first_us, normal, estimate.impulse_m_s)
         return after
 
-    def _contact_force(self, impact: Impact, came_ned_m_s: Vector3) -> ContactForce | None:
+    def _contact_force(self, impact: Impact) -> ContactForce | None:
         """Of a contact that a turn shows the first force is still to come; one that a velocity shows is over."""
         imu, is_shown = self.imu, impact.evidence is Evidence.FORCE
         if imu is None or impact.evidence is Evidence.VELOCITY_JUMP:
             return None
         free = impact.free_frd_m_s2 or minus(imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2)
         averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
-        contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2, came_ned_m_s)
+        contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2)
         contact.is_clipped = self.hides_clipping or not is_shown
         if is_shown:
             contact.add(imu, imu.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
@@ -189,13 +188,13 @@ class ImpactEstimator(Motion):
                 estimate = replace(estimate, time_boot_us=contact.begun_boot_us, time_error_us=error_us)
             estimate = replace(
                 estimate,
-                normal=normal_of(contact.impulse_ned_m_s, contact.came_ned_m_s, self.hides_clipping),
+                normal=normal_of(contact.impulse_ned_m_s, estimate.velocity_ned_m_s, self.hides_clipping),
                 peak_specific_force_m_s2=max(math.hypot(*force) for force in contact.forces_ned_m_s2),
                 impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
             )
         if contact is not None:
             # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-            is_whole = contact.is_fully_measured(is_over)
+            is_whole = contact.is_fully_measured(is_over, estimate.velocity_ned_m_s)
             is_lower_bound = contact.has_gap or not is_whole
             estimate = replace(estimate, is_fully_measured=is_whole, is_lower_bound=is_lower_bound)
         self.estimate = replace(estimate, is_final=is_over)

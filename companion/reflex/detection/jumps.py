@@ -21,8 +21,6 @@ from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex import config as reflex
 from companion.reflex.detection.detector import Innovation
 
-_MEMORY_US = 1e6 * reflex.MEMORY_S
-
 
 @dataclass(slots=True)
 class RateJump(Innovation):
@@ -68,7 +66,7 @@ class RateJump(Innovation):
         size = self.value = math.hypot(i, j, k)
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
-        self.variance_rad2_s2 += was_us / (_MEMORY_US + was_us) * (learnt * learnt - self.variance_rad2_s2)
+        self.variance_rad2_s2 += was_us / (1e6 * reflex.MEMORY_S + was_us) * (learnt * learnt - self.variance_rad2_s2)
         if size >= self.shown * limit or not 0 <= time_us - self.shown_us <= SHOWN_US:
             self.shown, self.shown_us = size / limit, time_us
 
@@ -77,7 +75,6 @@ class RateJump(Innovation):
 class VelocityJump:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
-    averaging_us: int
     since_us: int = 0  # velocities before this time are not compared
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
@@ -113,21 +110,18 @@ class VelocityJump:
         self.known = min(self.known + 1, MEMORY_STEPS)
         self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
 
-    def least_m_s(self, config: reflex.FusedConfig, caution: float, shaking_m_s2: float, apart_us: int) -> float:
+    def least_m_s(self, config: reflex.FusedConfig, caution: float) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
 
         It is `noise_factor` spreads, and more after few steps, by Student's t (its quantile, expanded in 1 / degrees of
         freedom). Each has three axes, and shares velocities with those around it: four are worth as much as one. It is
-        larger by `caution` where the estimate may jump without a hit, and by vibration between the samples (standard
-        deviation `shaking_m_s2`), of whose newest interval of `apart_us` an averaging window covers a part.
+        larger by `caution` where the estimate may jump without a hit.
         """
         if not self.known:
             return math.inf
         spreads, spread_m_s = config.noise_factor, reflex.EXCESS * math.sqrt(self.variance_m2_s2)
         noise_m_s = spreads * spread_m_s * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
-        unseen_share = max(0.0, 1.0 - self.averaging_us / max(apart_us, 1))
-        unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
-        return caution * max(config.velocity_step_m_s, noise_m_s) + unseen_m_s
+        return caution * max(config.velocity_step_m_s, noise_m_s)
 
 
 def _newest_less_mean(vectors: Iterable[Vector3]) -> Vector3:

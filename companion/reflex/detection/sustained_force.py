@@ -73,8 +73,7 @@ class SustainedForceMonitor:
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
         self.imu_count += 1
-        (x, y, z), (a, b, c), share = self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count
-        self.measured_frd_m_s2 = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
+        self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
 
     def step(
         self, sample: LocalPosition, strapdown: Strapdown, goal_ned_m: Vector3 | None, is_free: bool, may_tip: bool
@@ -107,8 +106,6 @@ class SustainedForceMonitor:
             peak_specific_force_m_s2=force_m_s2,
             impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
             is_fully_measured=True,
-            is_lower_bound=False,
-            is_final=True,
         )
 
     def _held(self, sample: LocalPosition, goal_ned_m: Vector3 | None, elapsed_s: float) -> Vector3 | None:

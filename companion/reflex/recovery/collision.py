@@ -60,7 +60,6 @@ class Progress(NamedTuple):
     is_rejected: bool  # the hit was none, as nothing but its first message shows it
     rested_s: float | None  # it rests, and is flown by a position from now on
     rebound_m_s: float | None  # the goal has moved
-    settled_s: float | None  # the recovery is over
 
 
 @dataclass(slots=True)
@@ -79,7 +78,7 @@ class Collision:
     earlier: Sequence[Surface] = ()  # what was hit before in the same recovery
     keeps_trim: bool = False  # see interface.Autopilot
     hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
-    settled_after_s: float | None = None  # from its first sample to the beginning of its rest
+    settled_after_s: float | None = None  # from its first sample to the beginning of its rest; the recovery is over
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
@@ -156,7 +155,7 @@ class Collision:
         if self.law.follows and (self.leans or not self.law.leans):
             rested_s, rebound_m_s = self._follow(sample)
         self.settled_after_s = self._settled_after_s(sample)
-        return Progress(is_rejected, rested_s, rebound_m_s, self.settled_after_s)
+        return Progress(is_rejected, rested_s, rebound_m_s)
 
     @property
     def is_pressed(self) -> bool:

@@ -68,7 +68,7 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
     for number, force in enumerate(pushes, start=1):
         contact.add(ImuSample(1_000_000 + number * every_us, (force, 0.0, -9.81), STILL), every_us, LEVEL)
-    assert contact.has_gap or not contact.is_fully_measured(False)
+    assert contact.has_gap or not contact.is_fully_measured(False, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -76,12 +76,13 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
 )
 def test_a_contact_is_clipped_that_ends_before_it_has_stopped_the_vehicle(came_m_s, every_ms, whole):
     # Given the chatter of a rigid frame, far below the sensor's range: 0.5 m/s, or 1.8 where samples are apart
-    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9, (came_m_s, 0.0, 0.0))
+    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
     for number in range(1, 4):
         contact.add(ImuSample(1_000_000 + number * 1000 * every_ms, (-40.0, 0.0, -9.81), STILL), 1000 * every_ms, LEVEL)
-    assert contact.is_fully_measured(False)
+    came_ned_m_s = (came_m_s, 0.0, 0.0)
+    assert contact.is_fully_measured(False, came_ned_m_s)
     # When it is over and the vehicle would go on into it
-    assert contact.is_fully_measured(True) is whole
+    assert contact.is_fully_measured(True, came_ned_m_s) is whole
 
 
 @pytest.mark.parametrize(("hides_clipping", "normal_deg"), [(False, 45.0), (True, 0.0)])
