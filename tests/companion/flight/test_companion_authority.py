@@ -11,7 +11,7 @@ from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, flight, flying_in
 from tests.flying import Flight
 
-IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "landing"]
+IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "returning", "landing"]
 ON_SETPOINTS = ["takeoff", "mission", "recovering", "holding"]
 
 

@@ -339,14 +339,6 @@ def test_after_a_restart_the_new_arming_position_counts():
     assert f.vehicle.position == pytest.approx([15.0, 5.0, -1.5], abs=0.3)
 
 
-def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():
-    f = resumed(4, 5_000_000)
-    f.run_until(lambda: [e.data["step"] for e in f.events if e.kind == "item"][-1:] == [5])
-    f.companion.stop("Ctrl-C")
-    f.run_to_end()
-    assert f.event("aborted").data["next_step"] == 5
-
-
 def test_the_hits_of_before_count_for_what_the_mission_expects():
     items = [*ITEMS[:-1], {"expect": {"collisions": {"exactly": 1}}}, ITEMS[-1]]
     f = resumed(6, 5_000_000, items, hits=1)
