@@ -292,16 +292,6 @@ def test_a_vehicle_that_has_fallen_silent_is_asked_who_has_it():
     assert [(m.command, m.param1) for at_us, m in f.vehicle.commands if at_us >= since_us] == [(512, 0)]
 
 
-def test_a_cut_link_that_comes_back_in_the_companions_mode_is_handed_over():
-    f = flying_in("mission")
-    f.vehicle.silent = f.vehicle.deaf = True
-    f.run_for(3.0)
-    assert f.vehicle.mode == OFFBOARD
-    f.vehicle.silent = f.vehicle.deaf = False
-    f.run_to_end(1.5)
-    assert f.vehicle.mode == LOITER
-
-
 @pytest.mark.parametrize("state", ON_SETPOINTS)
 def test_a_takeover_at_any_instant_stops_the_setpoints_with_the_report_that_shows_it(state):
     """All of a recovery, half a second of the others: ahead of, with and behind every stream and setpoint."""

@@ -163,17 +163,6 @@ class Detection:
             self.detector.update(estimate._replace(time_boot_us=self.now_us), armed, asked_down)
 
 
-def test_a_landing_takes_a_second_in_three_stages():
-    detection = Detection()
-    stages = []
-    for _ in range(200):
-        detection.feed(0.008, thrust=NONE)
-        detector = detection.detector
-        stages.append((detector.ground_contact, detector.maybe_landed, detector.landed))
-    first = [next(i for i, stage in enumerate(stages) if stage[which]) * 0.008 for which in range(3)]
-    assert first == pytest.approx([1 / 3, 2 / 3, 1.0], abs=0.03)
-
-
 @pytest.mark.parametrize(
     ("hinders", "touches"),
     [
