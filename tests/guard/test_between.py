@@ -289,21 +289,6 @@ def test_in_a_recovery_a_stick_is_obeyed_at_once():
     assert air.state is State.STOOD_DOWN
 
 
-@pytest.mark.parametrize("mode", [commanded.HOLD, LAND, commanded.MANUAL_POSITION])
-def test_in_a_recovery_a_mode_that_is_asked_for_is_taken_at_once_and_stays(mode):
-    air = hit(by_places)
-    sticks(air, 0.0)
-    air.run_for(0.4)
-    asked_s = air.time_s
-    air.set_mode(mode)
-    air.run_for(0.01)
-    assert air.sent_by("program", "COMMAND_LONG", asked_s) != []
-    air.run_to(State.STOOD_DOWN, 1.5)
-    air.run_for(1.0)
-    main, sub = mode
-    assert air.others_last["HEARTBEAT"].custom_mode == main << 16 | sub << 24
-
-
 def test_in_a_recovery_a_request_for_offboard_does_not_arrive_and_a_disarm_does():
     air = hit(by_places)
     air.run_for(0.4)

@@ -88,7 +88,6 @@ CONNECTED, GUARDS = ("fly", SQUARE, "--connect"), "companion.estimate.guards.cen
         (("logs", "list", "--runs", "nowhere"), ("nowhere is no folder",)),
         (("report", WALL), (f"{WALL} is no flight's folder; `rebound replay` reads logs",)),
         (("check", 300 * "a"), ("File name too long",)),
-        (("fly", "--sim", "no-such-mission.yaml"), ("no-such-mission.yaml",)),
         ((*CONNECTED, "the drone"), ("udpin://HOST:PORT",)),
         (("preflight", "--connect", "nowhere"), ("'nowhere' is not a connection address",)),
         (("sim", "--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),

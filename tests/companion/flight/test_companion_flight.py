@@ -13,31 +13,13 @@ from bench.fly.virtual_time import EPOCH_US
 from companion.flight.context import Target
 from companion.flight.handlers.progress import FlyItems
 from companion.flight.operator import Texts, status_text
-from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
+from companion.flight.states import FINAL_STATES, TABLE, State
 from companion.guard import states as guard_states
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight, flying_in, hovering, strike
-
-BEFORE_THE_FLIGHT = {State.CONNECT, State.READY}
-IN_THE_AIR = set(State) - set(FINAL_STATES) - BEFORE_THE_FLIGHT - {State.CRASHED}
-
-
-@pytest.mark.parametrize("state", [state for state in State if state not in FINAL_STATES])
-def test_every_state_can_be_interrupted_and_a_refusal_counts_until_the_vehicle_has_taken_off(state):
-    assert TABLE[state].get(Trigger.INTERRUPTED) is State.ABORTED
-    refused = State.ABORTED if state in {*BEFORE_THE_FLIGHT, State.TAKEOFF} else None
-    assert TABLE[state].get(Trigger.REFUSED) is refused
-
-
-@pytest.mark.parametrize("state", State)
-def test_in_the_air_whoever_takes_control_has_it_and_there_alone_every_hit_is_recovered_from(state):
-    assert TABLE[state].get(Trigger.COLLISION) is (State.RECOVERING if state in IN_THE_AIR else None)
-    if state in IN_THE_AIR:
-        assert TABLE[state].get(Trigger.CONTROL_LOST) is State.ABORTED
-        assert TABLE[state].get(Trigger.CRASHED) is State.CRASHED
 
 
 @pytest.mark.parametrize(
@@ -166,15 +148,6 @@ def test_a_fall_to_the_ground_is_told_as_a_crash():
     strike(f, 60.0, 0.0)
     crash = f.event("crash")
     assert crash.data["down_m_s"] > 3.5 and "tilted by 0 degrees" in crash.text
-
-
-def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
-    f = at_wall(INTO_WALL, companion={"settled": {"speed_m_s": 1e-6, "timeout_s": 2.0}})
-    f.run_to("recovering")
-    f.run_to("holding", 3.0)
-    assert "not settled" in f.event("recovered").text
-    report = f.run_to_end()
-    assert (report.outcome, report.collisions[0].settled_after_s) == ("completed", None)
 
 
 def test_headings_turn_the_shorter_way_at_a_limited_rate():

@@ -143,13 +143,6 @@ def test_lost_answers_and_lost_commands_are_repeated():
     assert confirmations == [0, 1]
 
 
-def test_px4s_double_answer_to_the_mode_is_believed_only_when_the_mode_is_seen():
-    double = FakeVehicle(ack=lambda c, n: [0, 1] if (c, n) == (176, 1) else [0], obey=lambda c, n: c != 176 or n > 1)
-    f = flight(double)
-    assert f.run_to_end().outcome == "completed"
-    assert f.vehicle.counts[176] >= 2
-
-
 @pytest.mark.parametrize(
     ("asked", "answer", "words"),
     [(400, 1, ("not armed", "TEMPORARILY_REJECTED", "commander check")), (176, 2, ("no OFFBOARD", "DENIED"))],

@@ -93,12 +93,6 @@ def test_the_surface_is_a_guards_reach_ahead_of_the_centre_or_behind_one_that_it
 # --- patches of the same surface
 
 
-def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
-    (patch,) = around().joined([wall(0.0), wall(1.05)]).patches
-    low_m, high_m = patch.assumed_along_m()
-    assert len(patch.touches_ned_m) == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
-
-
 def test_the_places_give_a_better_normal_than_the_pushes():
     """Two touches 2 m apart on a wall turned by 10 degrees, each with a normal 20 degrees off."""
     slope = math.tan(math.radians(10.0))

@@ -68,13 +68,6 @@ class Opened(HTMLParser):
         return [attributes[name] for _, attributes in self.tags if name in attributes]
 
 
-@pytest.mark.parametrize(("most", "kind"), [(60.0, "i2"), (6000.0, "i4")])
-def test_a_column_takes_two_bytes_a_number_where_it_fits_and_four_elsewhere(most, kind):
-    column = packed(values := np.linspace(-most, most, 77), 0.01)
-    assert column["kind"] == kind
-    assert np.abs(unpacked(column) - values).max() <= 0.005 + 1e-9
-
-
 def test_what_is_not_finite_is_none_and_harms_no_neighbour():
     again = unpacked(packed(np.array([1.0, np.nan, -np.inf, 2.0]), 0.001))
     assert np.isnan(again).tolist() == [False, True, True, False] and np.allclose(again[[0, 3]], [1.0, 2.0])

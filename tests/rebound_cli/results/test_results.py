@@ -180,16 +180,6 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
 
 
-def test_without_truth_nothing_is_counted_and_without_a_contact_zero():
-    summary = build_summary(Flown(made_up.report(collision(10_004)), 25.0, None), 0.5, "wall", None, None)
-    unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
-    assert [summary[key] for key in unknown] == [None] * 5
-    assert summary["collisions"][0]["truth"] is None
-    truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
-    summary = build_summary(Flown(made_up.report(), 0.5, truth), *FACTS)
-    assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]
-
-
 SIDE = math.sqrt(0.5)
 
 

@@ -134,6 +134,7 @@ def test_sticks_take_over_from_a_failsafe():
 
 def test_terminated_is_for_good():
     flight = hovering(5.0)
+    assert flight.ask(COMPONENT_ARM_DISARM, 0) is Result.TEMPORARILY_REJECTED
     assert flight.ask(DO_FLIGHTTERMINATION, 0) is Result.DENIED
     assert flight.ask(DO_FLIGHTTERMINATION, 1) is Result.ACCEPTED
     assert flight.autopilot.commander.system_status == 8
@@ -143,14 +144,6 @@ def test_terminated_is_for_good():
     assert set_mode(flight, Mode.LOITER) is Result.TEMPORARILY_REJECTED
     flight.ask(COMPONENT_ARM_DISARM, 0, 21196)
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
-
-
-def test_killed_in_the_air_it_falls():
-    flight = hovering(5.0)
-    assert flight.ask(COMPONENT_ARM_DISARM, 0) is Result.TEMPORARILY_REJECTED
-    assert flight.ask(COMPONENT_ARM_DISARM, 0, 21196) is Result.ACCEPTED
-    flight.fly(2.0)
-    assert flight.height_m == 0.0
 
 
 def lose_gps(flight: Flight) -> None:
