@@ -13,13 +13,31 @@ from bench.fly.virtual_time import EPOCH_US
 from companion.flight.context import Target
 from companion.flight.handlers.progress import FlyItems
 from companion.flight.operator import Texts, status_text
-from companion.flight.states import FINAL_STATES, TABLE, State
+from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.guard import states as guard_states
 from companion.mavlink.encode import Encoder
 from companion.messages import Severity, StatusText
 from companion.report import Event
 from tests.companion import fake_vehicle
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, TAKEOFF, at_wall, flight, flying_in, hovering, strike
+
+BEFORE_THE_FLIGHT = {State.CONNECT, State.READY}
+IN_THE_AIR = set(State) - set(FINAL_STATES) - BEFORE_THE_FLIGHT - {State.CRASHED}
+
+
+@pytest.mark.parametrize("state", [state for state in State if state not in FINAL_STATES])
+def test_every_state_can_be_interrupted_and_a_refusal_counts_until_the_vehicle_has_taken_off(state):
+    assert TABLE[state].get(Trigger.INTERRUPTED) is State.ABORTED
+    refused = State.ABORTED if state in {*BEFORE_THE_FLIGHT, State.TAKEOFF} else None
+    assert TABLE[state].get(Trigger.REFUSED) is refused
+
+
+@pytest.mark.parametrize("state", State)
+def test_in_the_air_whoever_takes_control_has_it_and_there_alone_every_hit_is_recovered_from(state):
+    assert TABLE[state].get(Trigger.COLLISION) is (State.RECOVERING if state in IN_THE_AIR else None)
+    if state in IN_THE_AIR:
+        assert TABLE[state].get(Trigger.CONTROL_LOST) is State.ABORTED
+        assert TABLE[state].get(Trigger.CRASHED) is State.CRASHED
 
 
 @pytest.mark.parametrize(
