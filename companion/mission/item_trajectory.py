@@ -42,8 +42,8 @@ class SpeedLimits:
 
     def limits(self, item: items.Motion | items.ReturnItem) -> tuple[float, float, float]:
         """Speed and acceleration, the item's or the present ones; and the acceleration while the speed grows."""
-        speed_m_s = item.speed_m_s or self.speed_m_s
-        return slowed_m_s(speed_m_s, self.factor), getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
+        speed_m_s = slowed_m_s(item.speed_m_s or self.speed_m_s, self.factor)
+        return speed_m_s, getattr(item, "acceleration_m_s2", None) or self.acceleration_m_s2, self.speeding_up_m_s2
 
 
 def slowed_m_s(speed_m_s: float, factor: float) -> float:

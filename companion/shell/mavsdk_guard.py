@@ -88,9 +88,10 @@ class CollisionGuard:
     def stop(self) -> None:
         """Give the vehicle back if the guard holds it, and release MAVSDK. Takes 10 s at most."""
         with self._changed:
-            self._guard.core.stop_reason = "stopped by the program"
+            core = self._guard.core
+            core.stop_reason = "stopped by the program"
             if self._thread.is_alive():
-                self._changed.wait_for(lambda: self._guard.core.handler.finished or self._is_over, GIVING_BACK_US * 1e-6)
+                self._changed.wait_for(lambda: core.handler.finished or self._is_over, GIVING_BACK_US * 1e-6)
             self._is_over = True
             self._changed.notify_all()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
