@@ -65,6 +65,10 @@ def test_normal_goes_back_along_the_normal_and_keeps_or_damps_the_rest():
     goal, on = (goal_of("normal", touched, tangential=how) for how in ("damped", "kept"))
     assert off_m(touched, goal) == pytest.approx(0.5) and math.dist(goal, AT) == pytest.approx(0.5)
     assert off_m(touched, on) == pytest.approx(0.5) and math.dist(on, goal) == pytest.approx(0.5 * math.sqrt(3))
+    # The adaptive law's goal goes on as far along it
+    goal, on = (goal_of("adaptive", touched, tangential=how) for how in ("damped", "kept"))
+    assert off_m(touched, on) == pytest.approx(off_m(touched, goal))
+    assert math.dist(on, goal) == pytest.approx(0.5 * math.sqrt(3))
 
 
 @pytest.mark.parametrize("speed", ALL_SPEEDS)
