@@ -29,11 +29,8 @@ Json = dict[str, Any]
 RECORDS_FOLDER = Path("runs") / "campaigns"
 # Half of a SHA-256 in hexadecimal digits would do against accidents; this much is still readable in a file's name.
 KEY_DIGITS = 16
-# All code that a row may depend on, beside the module of the function that makes it. Studies only look at rows.
-CODE = (
-    *("companion", "sim_vehicle", "rebound_cli"),
-    *("bench.cases", "bench.detectors", "bench.faults", "bench.fly", "bench.rows"),
-)
+# All code that a row may depend on.
+CODE = ("companion", "sim_vehicle", "rebound_cli", "bench")
 
 
 class CampaignError(ReboundError):
@@ -59,7 +56,7 @@ def run_campaign(
 
     `work_out` is a function of a module (workers import it) from a case to what JSON can hold. Raises CampaignError.
     """
-    path = record_path(name, work_out, folder)
+    path = record_path(name, folder)
     known = read_record(path)
     missing = [case for case in cases if "result" not in known.get(repr(case), {})]
     if missing and len(missing) < len(cases):
@@ -116,18 +113,14 @@ def _outcome(work_out: Callable[[Any], Json], case: Any) -> Json:
         gc.enable()
 
 
-def record_path(name: str, work_out: Callable[[Any], Json], folder: Path = RECORDS_FOLDER) -> Path:
+def record_path(name: str, folder: Path = RECORDS_FOLDER) -> Path:
     """A file of its own for other code: the release, and a digest of all code that a row may depend on."""
-    digest = hashlib.sha256(_file(work_out.__module__).read_bytes())
-    for room in (_file(module).parent for module in CODE):
+    digest = hashlib.sha256()
+    for room in (Path(str(importlib.import_module(module).__file__)).parent for module in CODE):
         for path in sorted(room.rglob("*")):
             if path.suffix in (".py", ".yaml"):
                 digest.update(path.relative_to(room).as_posix().encode() + path.read_bytes())
     return folder / f"{name}-{__version__}-{digest.hexdigest()[:KEY_DIGITS]}.jsonl"
-
-
-def _file(module: str) -> Path:
-    return Path(str(importlib.import_module(module).__file__))
 
 
 def read_record(path: Path) -> dict[str, Json]:

@@ -1,6 +1,5 @@
 """The campaign engine: who computes, in what order and how often it was broken off changes nothing."""
 
-import importlib
 import json
 import os
 import random
@@ -11,13 +10,7 @@ from pathlib import Path
 import pytest
 
 from bench.fly import campaign as running
-from bench.fly.campaign import CODE, CampaignError, run_campaign
-from bench.rows.judge import work_out_mission
-from bench.studies import kills
-from bench.studies.detection.detectors import work_out_hit
-from bench.studies.detection.hits import work_out_flown
-from bench.studies.faults import work_out_fault
-from tests.test_structure import imports_of_all
+from bench.fly.campaign import CampaignError, run_campaign
 
 
 @dataclass(frozen=True)
@@ -92,23 +85,3 @@ def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, mon
     # Then only what was missing or had failed is worked out, and the results are the same
     assert again == [4, *range(10, 30)]
     assert resumed == whole
-
-
-# --- its version is made of all code that its rows follow from
-
-
-@pytest.mark.parametrize(
-    "work_out",
-    [work_out_mission, work_out_hit, work_out_flown, work_out_fault, kills.work_out],
-    ids=lambda function: function.__module__,
-)
-def test_all_code_that_a_row_follows_from_is_in_its_version(work_out):
-    # Given all that the function's module imports, by whatever way
-    reached, left = set(), {work_out.__module__}
-    while left:
-        reached |= left
-        left = {name for module in left for name in imports_of_all().get(module, ())} - reached
-    # Then each lies in a package whose code the version is made of, or only shows or names what was found
-    packages = [str(importlib.import_module(room).__package__) for room in CODE]
-    beside = [name for name in reached if not any(f"{name}.".startswith(f"{package}.") for package in packages)]
-    assert {*beside} <= {work_out.__module__, "bench", "bench.studies", "bench.studies.study"}

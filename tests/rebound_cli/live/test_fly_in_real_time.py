@@ -152,7 +152,7 @@ SITL = shutil.which("arducopter")
 
 @pytest.mark.skipif(SITL is None, reason="there is no arducopter, ArduPilot's SITL, in the PATH")
 def test_the_wall_is_flown_by_the_real_firmware(tmp_path):
-    defaults, folder = tmp_path / "rigid.parm", tmp_path / "run"
+    defaults, folder = tmp_path / "foldable.parm", tmp_path / "run"
     defaults.write_text(as_parameter_file(load_built_in("foldable")))
     options = ("--model", "JSON:127.0.0.1", "-I", str(INSTANCE), "--speedup", "100", "--defaults", str(defaults), "-w")
     with subprocess.Popen([SITL, *options], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as sitl:
