@@ -34,16 +34,32 @@ def describe(item: items.ExpectItem) -> str:
 
 def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int) -> None:
     """Take up an expectation; what can be said at once is said."""
+    _look(flight, _begun(flight, label, item, now_us), now_us)
+
+
+def _begun(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int) -> Expectation:
     expectation = Expectation(item, now_us, len(flight.collisions), ExpectationReport(label, describe(item)))
     flight.expectations.append(expectation)
-    _look(flight, expectation, now_us)
+    return expectation
 
 
 def review(flight: FlightContext, now_us: int, is_over: bool = False) -> None:
-    """Look at those that are still open. `is_over`: a hit that has not come will not, and none is none."""
+    """Look at those that are still open.
+
+    `is_over`: a hit that has not come will not, and none is none. Of steps that the flight has not come to what is said
+    of the whole flight counts, and nothing else is met.
+    """
     for expectation in flight.expectations:
         if expectation.report.met is None:
             _look(flight, expectation, now_us, is_over)
+    begun = {expectation.report.label for expectation in flight.expectations}
+    for step in flight.steps[flight.step_index :] if is_over and flight.armed_at_us is not None else ():
+        if isinstance(step.action, items.ExpectItem) and step.label not in begun:
+            expectation = _begun(flight, step.label, step.action, now_us)
+            if isinstance(step.action.check, items.ExpectHits | items.ExpectRecovered | items.ExpectFlightTime):
+                _look(flight, expectation, now_us)
+            else:
+                _decide(flight, expectation, now_us, False, "the flight did not come to it")
 
 
 def _look(flight: FlightContext, expectation: Expectation, now_us: int, is_over: bool = False) -> None:
@@ -51,10 +67,13 @@ def _look(flight: FlightContext, expectation: Expectation, now_us: int, is_over:
     if verdict is None and is_over:
         verdict = isinstance(expectation.item.check, items.ExpectNoHit), "none until the end of the flight"
     if verdict is not None:
-        met, detail = verdict
-        expectation.report = replace(expectation.report, met=met, detail=detail)
-        text = f"{'met' if met else 'NOT met'}: {expectation.report.text} ({detail})"
-        flight.report(now_us, "expect", text, met=met)
+        _decide(flight, expectation, now_us, *verdict)
+
+
+def _decide(flight: FlightContext, expectation: Expectation, now_us: int, met: bool, detail: str) -> None:
+    expectation.report = replace(expectation.report, met=met, detail=detail)
+    text = f"{'met' if met else 'NOT met'}: {expectation.report.text} ({detail})"
+    flight.report(now_us, "expect", text, met=met)
 
 
 def _verdict(flight: FlightContext, expectation: Expectation, now_us: int) -> tuple[bool, str] | None:

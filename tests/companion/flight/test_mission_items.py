@@ -273,13 +273,15 @@ def test_each_expectation_is_met_or_not_and_the_flight_goes_on():
 
 
 def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
-    f = flight(items=[TAKEOFF, {"expect": {"no_collision": {}}}, {"hold": {"duration_s": 9}}, LANDING])
+    later = [{"expect": wish} for wish in ({"collisions": {"exactly": 0}}, {"height": {"min_m": 1}})]
+    f = flight(items=[TAKEOFF, {"expect": {"no_collision": {}}}, {"hold": {"duration_s": 9}}, *later, LANDING])
     f.run_to("mission")
     f.run_for(1.0)
     f.companion.stop("Ctrl-C")
     report = f.run_to_end()
     assert report.outcome == "aborted" and report.reason == "Ctrl-C"
-    assert [result.met for result in report.expectations] == [True]
+    # What is said of the whole flight, too; what is said of a place that it did not come to is not met
+    assert [result.met for result in report.expectations] == [True, True, False]
 
 
 ITEMS = [
