@@ -81,6 +81,7 @@ TYPES: Mapping[str, Callable[[str], Any]] = {
     "address": host_and_port,
     "collisions": _expected,
     "count": number(int, 1, math.inf, "a count: give a whole number from 1 on"),
+    "flights": number(int, 1, 100_000, "a number of flights: give a whole number from 1 to 100000"),
     # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
     "instance": number(int, 0, 9, "an instance: give a number from 0 to 9"),
     "integer": int,

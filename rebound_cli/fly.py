@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.companion import Companion
-from companion.errors import ConfigurationError
+from companion.errors import ConfigurationError, ReboundError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connections.connection import Connection, udp_in
@@ -53,6 +53,8 @@ class Flight:
 def run_fly(options: Namespace) -> int:
     """Fly, write the run folder, tell the person. 0 only when the mission was completed."""
     is_simulated = options.connect is None
+    if options.instance and (options.sim not in ("px4", "ardupilot") or not is_simulated):
+        raise ConfigurationError("--instance belongs to --sim px4 and --sim ardupilot: leave it out here.")
     if not is_simulated and (options.airframe is not None or options.seed is not None):
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     for option in ("signing-key", "peer", "wait") if is_simulated else ():
@@ -171,16 +173,24 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
         port, words = PX4_SIMULATOR_PORT + instance, FIRST_ANSWER_WORDS
         options = ["--autopilot", "px4", "--port", str(port)]
         waits = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/how-to/px4.md) ..."
-    with VehicleProcess(flight.folder, options, words) as vehicle:
-        if waits:
-            flight.console.print(waits)
-        vehicle.wait_until_ready(flight.interrupts, flight.console)
-        # What PX4 said while it booted is old.
-        while px4 is not None and px4.receive(0):
-            pass
-        flown = _fly_connected(flight, px4 or own, confirm_now)
-        vehicle.check_running()
-    return replace(flown, truth=read_truth(flight.folder / run_folder.TRUTH_NAME))
+    flown: Flown | None = None
+    try:
+        with VehicleProcess(flight.folder, options, words) as vehicle:
+            if waits:
+                flight.console.print(waits)
+            vehicle.wait_until_ready(flight.interrupts, flight.console)
+            # What PX4 said while it booted is old.
+            while px4 is not None and px4.receive(0):
+                pass
+            flown = _fly_connected(flight, px4 or own, confirm_now)
+            vehicle.check_running()
+        vehicle.check_ended_well()
+        return replace(flown, truth=read_truth(flight.folder / run_folder.TRUTH_NAME))
+    except ReboundError as error:
+        if flown is None:
+            raise
+        # What is known of the flight is written first, without a truth.
+        return replace(flown, fault=flown.fault or error)
 
 
 def _fly_ardupilot(flight: Flight, world: inputs.SimulatedWorld, instance: int) -> Flown:

@@ -90,7 +90,9 @@ def run(options: argparse.Namespace, program: str) -> int:
         # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
         if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
-        said = f"{'' if error.filename is None else f'{error.filename}: '}{error.strerror}."
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        remedy = "; make room there, or write elsewhere" if is_full else ""
+        said = f"{'' if error.filename is None else f'{error.filename}: '}{error.strerror}{remedy}."
     print(f"{program}: {said}", file=sys.stderr)
     return code
 

@@ -5,6 +5,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from functools import partial
 
+from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.live.console import Console, console_for
@@ -15,12 +16,17 @@ from rebound_cli.report.page import write_page
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, versions
 
+# Of a flight that shows that there was no collision: most of it.
+LEAST_WATCHED = 0.5
+
 
 def run_replay(options: Namespace) -> int:
     """Print the findings, write their page.
 
     1 when they are not what was expected, when a flight did not come again, or when nothing was watched.
     """
+    if options.least_watched is not None and options.expect != 0:
+        raise ConfigurationError("--least-watched belongs to --expect 0: leave it out here.")
     console = console_for(False)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
@@ -29,7 +35,8 @@ def run_replay(options: Namespace) -> int:
     if replay.findings.impacts:
         folder.mkdir(parents=True, exist_ok=True)
         console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
-    return _exit_code(replay, options.expect, options.least_watched, console)
+    least_watched = LEAST_WATCHED if options.least_watched is None else options.least_watched
+    return _exit_code(replay, options.expect, least_watched, console)
 
 
 def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], ShownFlight]]:

@@ -43,7 +43,7 @@ class Patch(StrictModel):
     """Of any length; a wall's counts as horizontal, see surface.away_from."""
     normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
     """One standard deviation; the normal of one whole contact."""
-    reaches_m: NotNegative = REACHES_M
+    reaches_m: Annotated[NotNegative, Field(le=FARTHEST_M)] = REACHES_M
     """The least that it is assumed to extend beyond its touches."""
     found_at_us: Annotated[int, Field(strict=True, ge=0)] = 0
     """When it was first touched, by the clock of the flight that did."""

@@ -6,12 +6,11 @@ does.
 
 import os
 import re
-from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
 from companion.mavlink.signing import KEY_LENGTH, LAST_STAMP, MINUTE, stamp_at
-from companion.shell.files import write_whole
+from companion.shell import files
 
 _DIGITS = re.compile(rb"\s*([0-9a-fA-F]{64})\s*")
 _STAMP = re.compile(rb"\s*([0-9]{1,15})\s*")
@@ -42,10 +41,7 @@ def read_key(path: Path) -> bytes:
 def write_new(path: Path, content: bytes) -> None:
     """A file for its owner alone, where there is none yet. Raises ConfigurationError."""
     try:
-        with open(path, "xb", opener=partial(os.open, mode=0o600)) as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        files.write_new(path, content, mode=0o600)
     except FileExistsError:
         raise ConfigurationError(f"{path} exists already and is left as it is: give another name.") from None
     except OSError as error:
@@ -88,4 +84,4 @@ class StampFile:
 
     def keep(self, stamp: int) -> None:
         """Whenever the program or the power ends, the file holds the old stamp or the new one. Raises OSError."""
-        write_whole(self._path, b"%d\n" % stamp)
+        files.write_whole(self._path, b"%d\n" % stamp)

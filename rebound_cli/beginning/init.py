@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from companion.errors import ConfigurationError
+from companion.shell.files import write_new
 from rebound_cli.inputs.documents import suggestion
 from rebound_cli.inputs.shipped import shipped_examples, shipped_missions
 
@@ -18,6 +19,8 @@ def run_init(options: Namespace) -> None:
     if options.list:
         print("\n".join([*missions, *(f"--example {name}" for name in examples)]))
     elif options.example is not None:
+        if options.model is not None:
+            raise ConfigurationError("--from is a mission, --example an example: leave one of them out.")
         example = _named(options.example, "example", examples)
         file = options.file or Path(example.name)
         _write(file, example.read_text(encoding="utf-8"))
@@ -25,7 +28,8 @@ def run_init(options: Namespace) -> None:
     elif options.file is None:
         raise ConfigurationError("Which file? Such as: rebound init my-mission.yaml")
     else:
-        _copy_mission(options.file, options.model, _named(options.model, "mission", missions))
+        model = options.model or "wall"
+        _copy_mission(options.file, model, _named(model, "mission", missions))
 
 
 def _named(name: str, kind: str, shipped: Mapping[str, Path]) -> Path:
@@ -52,7 +56,6 @@ def _copy_mission(file: Path, model: str, mission: Path) -> None:
 def _write(file: Path, text: str) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with file.open("x", encoding="utf-8") as new:
-            new.write(text)
+        write_new(file, text.encode())
     except FileExistsError:
         raise ConfigurationError(f"{file} is there already: nothing was written.") from None

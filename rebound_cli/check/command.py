@@ -26,18 +26,19 @@ def run_check(options: Namespace) -> int:
         return 0
     if not options.missions:
         raise ConfigurationError("give one mission file or more, such as missions/wall.yaml, or --schema.")
-    wrong = 0
+    wrong, pages = 0, dict[Path, Path]()
     for number, path in enumerate(options.missions):
         print("\n" if number else "", end="")
         try:
-            _check(path, options)
+            _check(path, options, pages)
         except (ReboundError, SimulationError) as error:
             print(f"rebound: {error}", file=sys.stderr)
             wrong += 1
     return 1 if wrong else 0
 
 
-def _check(path: Path, options: Namespace) -> None:
+def _check(path: Path, options: Namespace, pages: dict[Path, Path]) -> None:
+    """`pages`: those written so far, each with its mission."""
     document = load_mission_document(path, options.set, options.airframe)
     world = world_from(document)
     stand_own(world)
@@ -50,6 +51,8 @@ def _check(path: Path, options: Namespace) -> None:
     from rebound_cli.check.page import write_mission_page
 
     page = options.out / f"{mission.name}.html"
+    if pages.setdefault(page, path) != path:
+        raise ConfigurationError(f"{path} has the name of {pages[page]}, {mission.name!r}: {page} shows that one.")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         write_mission_page(page, mission, world, legs)

@@ -9,7 +9,7 @@ import threading
 import time
 from argparse import Namespace
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -60,7 +60,12 @@ def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Pa
     given = {workers.submit(_fly, options.mission.absolute(), airframe, case, out): case for case in cases}
     try:
         for number, done in enumerate(as_completed(given), start=1):
-            row, case = done.result(), given[done]
+            case = given[done]
+            try:
+                row = done.result()
+            except (BrokenExecutor, OSError) as error:
+                # A worker that was killed, or a full disk: what the others have flown is kept.
+                row = row_of(case, None, f"failed: {error}")
             left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
             hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"
             rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
@@ -75,9 +80,13 @@ def _workers(scheduler: str | None) -> Iterator[Executor]:
     """All cores, or a Dask scheduler's workers. Raises ConfigurationError where nobody answers at its address."""
     if scheduler is None:
         spawn = multiprocessing.get_context("spawn")
-        # Ctrl-C ends a flight, not a process that waits for the next one.
-        with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-            yield pool
+        # Ctrl-C ends a flight, not a process that waits for the next one. Nor does one outlive a SIGTERM.
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+                yield pool
+        finally:
+            signal.signal(signal.SIGTERM, before)
         return
     from distributed import Client
     from distributed.comm import resolve_address

@@ -96,8 +96,11 @@ def read_recording(folder: Path) -> Recording:
             raise LogError(f"{folder}: cut off before a whole step of the flight was written.")
         told = zip(lines, run_folder.read_records(folder / run_folder.EVENTS_NAME, events), strict=True)
         lines = [line for line, event in told if event["time_us"] < end_us]
-    with run_folder.reading(folder / run_folder.VERSIONS_NAME):
-        versions = dict(json.loads(run_folder.read_text(folder / run_folder.VERSIONS_NAME)))
+    versions_file, versions = folder / run_folder.VERSIONS_NAME, dict[str, str]()
+    # Only told: a flight can be shown and repeated without.
+    if versions_file.exists():
+        with run_folder.reading(versions_file):
+            versions = dict(json.loads(run_folder.read_text(versions_file)))
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from companion.mission.config import CompanionConfig
+from companion.shell.files import write_whole
 from rebound_cli.flights.kept import hits_in, hits_text
 from rebound_cli.inputs.documents import parse_document, refuse_existing, validated
 from rebound_cli.inputs.inputs import companion_settings
@@ -72,7 +73,7 @@ def run_tune(options: Namespace) -> None:
         print(f"With these settings still {alarms}: this vehicle is not made quiet by thresholds.\n")
     print(text, end="")
     if out is not None:
-        out.write_text(text, encoding="utf-8")
+        write_whole(out, text.encode())
         print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
 
 

@@ -29,6 +29,11 @@ def run_sim(options: Namespace) -> None:
     stopped = threading.Event()
     if options.truth is not None:
         _check_place(options.truth)
+    is_px4 = options.autopilot == "px4"
+    for option in ("signing-key", "remote", "link") if is_px4 else ("host", "sensor-rate"):
+        if getattr(options, option.replace("-", "_")):
+            whose = "the built-in autopilot" if is_px4 else "--autopilot px4"
+            raise ConfigurationError(f"--{option} belongs to {whose}: leave it out here.")
     world = load_world(options.mission, options.set, options.airframe, options.seed)
     # On a thread of its own: a vehicle does not stand still in the air because nobody reads what is printed.
     with console_for(False, Background("console")) as console:
@@ -39,7 +44,7 @@ def run_sim(options: Namespace) -> None:
             signal.signal(number, lambda *_: stopped.set())
         if options.stop_with_stdin:
             threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
-        serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
+        serve_it = _serve_px4 if is_px4 else _serve_builtin
         serve_it(options, world, stopped, console)
 
 
@@ -82,7 +87,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
     from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
 
     def new_vehicle() -> HilVehicle:
-        vehicle = HilVehicle(world.airframe, world.scene, world.scene.seed, 1_000_000 // options.sensor_rate)
+        vehicle = HilVehicle(world.airframe, world.scene, world.scene.seed, 1_000_000 // (options.sensor_rate or 1000))
         vehicle.truth.on_hit = partial(_tell_of, console)
         return vehicle
 
@@ -90,7 +95,8 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
     new_vehicle().step(MOTORS_STOPPED)
     console.print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.")
     port = PX4_SIMULATOR_PORT + options.instance if options.port is None else options.port
-    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, console.print, options.host)
+    host = options.host or "127.0.0.1"
+    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, console.print, host)
 
 
 def _wait_for_end_of_stdin(stopped: threading.Event) -> None:

@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import NoReturn, Self
 
 from companion.errors import ReboundError
 from rebound_cli.live.console import Console
@@ -57,10 +57,20 @@ class VehicleProcess:
                 time.sleep(_READY_POLL_S)
 
     def check_running(self) -> None:
-        """Raise ReboundError with the process's last words if it has ended."""
+        """Raise ReboundError if it has ended."""
         if self._process.poll() is not None:
-            last = self._said() or [f"exit code {self._process.returncode}"]
-            raise ReboundError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
+            self._raise_why()
+
+    def check_ended_well(self) -> None:
+        """Raise ReboundError if it has ended, but not by its leash alone."""
+        if self._process.returncode:
+            self._raise_why()
+
+    def _raise_why(self) -> NoReturn:
+        """With the process's last words, unless it was killed."""
+        code = self._process.returncode
+        last = (self._said() or [f"exit code {code}"])[-1] if code >= 0 else f"killed by signal {-code}"
+        raise ReboundError(f"The simulated vehicle ended by itself: {last.removeprefix('rebound: ')}")
 
     def _said(self) -> list[str]:
         return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()

@@ -24,9 +24,11 @@ def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: 
     faults = json.dumps([asdict(fault) for fault in truth.faults])
     arrays: dict[str, Any] = {**truth.series(), "hits": hits, "faults": faults, "epoch_at_boot_us": epoch_at_boot_us}
     arrays["stalls"] = np.array(stalls, dtype=np.int64).reshape(-1, 2)
+    unfinished = path.with_name(f"{path.name}.part")
     # Given a path, numpy would put its own ending on it.
-    with path.open("wb") as file:
+    with unfinished.open("wb") as file:
         np.savez_compressed(file, **arrays)
+    unfinished.replace(path)
 
 
 def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:

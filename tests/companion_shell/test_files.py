@@ -62,6 +62,10 @@ def test_a_power_cut_leaves_the_old_stamp(file, monkeypatch):
     monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError("power cut")))
     with pytest.raises(OSError, match="power cut"):
         StampFile(file).keep(NOW + 10 * MINUTE)
+    # Nor does a disk that takes no more leave half a file, which would be in the way of the next try
+    with pytest.raises(ConfigurationError, match="cannot be written"):
+        write_new(file.with_name("new"), b"0")
+    assert sorted(each.name for each in file.parent.iterdir()) == ["key", "key.stamp"]
     monkeypatch.undo()
     # Then the companion begins after the old one, and is not refused
     assert StampFile(file).first(0) == NOW + 2 * MINUTE

@@ -116,6 +116,10 @@ def test_neither_a_wrong_file_nor_a_page_that_cannot_be_written_hides_another_mi
     result = run_here("check", WALL, ROOT / "missions" / "square.yaml", "--out", wrong)
     assert result.returncode == 1 and "in all 15.5 m" in result.stdout and "square:" in result.stdout
     assert [line.endswith("cannot be written: File exists.") for line in result.stderr.splitlines()] == [True, True]
+    # Given two of one name, the page is the first one's
+    (twin := tmp_path / "twin.yaml").write_text((ROOT / WALL).read_text())
+    result = run_here("check", WALL, twin, "--out", tmp_path / "pages")
+    assert result.returncode == 1 and f"{twin} has the name of {WALL}, 'wall'" in result.stderr
 
 
 # --- the schema

@@ -1,12 +1,17 @@
 """`rebound compare`: every law at every speed, and what is told of it."""
 
 import csv
+from argparse import Namespace
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from unittest.mock import Mock
 
 import pytest
 from distributed import LocalCluster
 
 from rebound_cli.arguments import speeds_m_s
 from rebound_cli.compare.cases import Case
+from rebound_cli.compare.command import _flown
 from rebound_cli.compare.rows import lines_of, notes, row_of
 from rebound_cli.main import main
 from tests.rebound_cli.command import assert_one_clear_sentence, run_here
@@ -40,6 +45,18 @@ def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
     assert flown.returncode == 0 and "foldable airframe, seed 2" in flown.stdout
     there, here = (tmp_path / run / "flight.tlog" for run in ("there/as-written-seed-2", "here"))
     assert there.read_bytes() == here.read_bytes()
+
+
+def test_a_worker_that_is_killed_costs_its_own_flight_alone(tmp_path):
+    # Given workers of which the second one is killed, as for the memory that it takes
+    cases = [Case("paper", None, seed, ()) for seed in (1, 2)]
+    done, killed = Future(), Future()
+    done.set_result(row_of(cases[0], None, "flown"))
+    killed.set_exception(BrokenProcessPool("terminated abruptly"))
+    workers = Mock(submit=Mock(side_effect=[done, killed]))
+    # Then both have a row
+    flown = list(_flown(workers, Namespace(mission=tmp_path, airframe=None), cases, tmp_path))
+    assert {row.reason for _, row, _ in flown} == {"flown", "failed: terminated abruptly"}
 
 
 def test_what_cannot_be_compared_is_one_sentence_before_anything_is_flown(tmp_path):

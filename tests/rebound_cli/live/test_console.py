@@ -82,6 +82,9 @@ def test_what_a_vehicle_compiles_is_told_by_who_waits_for_it_and_ctrl_c_ends_tha
     interrupts.reason = "stopped with Ctrl-C"
     with pytest.raises(ReboundError, match="Ctrl-C"), VehicleProcess(tmp_path, []) as vehicle:
         vehicle.wait_until_ready(interrupts, Console(stream))
+    # And why it ended is said of one that was killed, as that one was
+    with pytest.raises(ReboundError, match="killed by signal 9"):
+        vehicle.check_ended_well()
 
 
 def test_the_link_is_a_rate_and_then_a_silence():
