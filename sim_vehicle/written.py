@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 # No number of a vehicle or its world is larger, in SI units; sums and squares of such numbers stay finite.
-LARGEST = 1e6
+LARGEST = 1e9
 
 
 def _possible(value: float) -> float:

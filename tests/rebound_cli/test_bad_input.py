@@ -105,7 +105,7 @@ CONNECTED, GUARDS = ("fly", SQUARE, "--connect"), "companion.estimate.guards.cen
         (("sim", "--autopilot", "px4", "--signing-key", "key"), ("--signing-key belongs to the built-in autopilot",)),
         (("replay", "none.ulg", "--least-watched", "0.9"), ("--least-watched belongs to --expect 0",)),
         (("init", "new.yaml", "--from", "square", "--example", "guard"), ("leave one of them out",)),
-        (("check", WALL, "--set", "sim.wind_ned_m_s=[1e9, 0, 0]"), ("no such number has a size above 1,000,000",)),
+        (("check", WALL, "--set", "sim.wind_ned_m_s=[1e10, 0, 0]"), ("no such number has a size above 1,000,000,000",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
         *((("service", what, "--connect", "udpin://:1"), ("belong to",)) for what in ("status", "check", "uninstall")),
         *(((*words, "yesterday", "--runs", "missions"), ("yesterday",)) for words in (("logs", "show"), ("report",))),
