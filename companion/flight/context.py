@@ -130,7 +130,7 @@ class FlightContext:
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
-    foreign_mode: Lasting = field(default_factory=Lasting)  # not ours, by trajectory_us; perhaps nobody decided it
+    foreign_mode_since_us: int | None = None  # when the mode was first not ours, though perhaps nobody decided it
     armed_at_us: int | None = None
     steps: tuple[Step, ...] = field(init=False)
     step_index: int = 0  # the one that is flown, or is to be flown next
@@ -151,7 +151,8 @@ class FlightContext:
     crashed: str = ""  # how, once it has
     is_wreck: bool = False  # since then, until it is disarmed or flies again
     motors: MotorWatch = field(default_factory=MotorWatch)
-    flew_us: int | None = None  # when it was last armed, and off the ground or about to be
+    flies: bool = False  # armed, and off the ground or about to be
+    flew_us: int | None = None  # when it last did
     may_crash: bool = False  # flies, or did a moment ago: whose motors stop in the air says at once that it has landed
     height_m: float | None = None  # above the arming position, where that and a place of late are known
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground

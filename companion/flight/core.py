@@ -127,7 +127,7 @@ class Core(ABC, Generic[FlightT]):
             if not PLACES.isdisjoint(kinds):
                 samples = self._in_one_frame(samples, now_us)
             refusal = self._hear(samples, now_us)
-            note_height(flight, now_us)
+            note_height(flight)
             impacts = () if flight.fault else self._notice(samples, now_us)
             acks = [each for each in samples if isinstance(each, CommandAck)] if CommandAck in kinds else []
             history = flight.vehicle.history
@@ -167,7 +167,9 @@ class Core(ABC, Generic[FlightT]):
     def _notice(self, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
         """The collisions that the samples show; what else they show is reported."""
         flight, reaction = self.flight, self.reflex.step(samples, self.situation(), now_us)
-        flight.blind.update(self.reflex.monitor.no_data_reason is not None, now_us)
+        is_blind = self.reflex.monitor.no_data_reason is not None
+        if is_blind or flight.blind.since_us is not None:
+            flight.blind.update(is_blind, now_us)
         for notice in reaction.notices:
             flight.report(now_us, notice.kind, notice.text, **notice.data)
         if reaction.has_touched_down:

@@ -63,8 +63,8 @@ class FlightCore(Core[FlightContext]):
         self.stop_reason = None
         if self.state not in FINAL_STATES and (end := early_end(flight, self.state, inputs, now_us)) is not None:
             self._take(end, now_us)
-        if flight.foreign_mode.since_us != self._away_us and flight.has_position and self.state in FOLLOWING:
-            self._away_us = flight.foreign_mode.since_us
+        if flight.foreign_mode_since_us != self._away_us and flight.has_position and self.state in FOLLOWING:
+            self._away_us = flight.foreign_mode_since_us
             if self._away_us is not None:
                 # On from where the vehicle is: it has stopped, and would chase its setpoint.
                 if isinstance(self.handler, FlyItems):

@@ -59,6 +59,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 flight.round_trip.update(sample, now_us)
         was_known = vehicle.is_mode_known
         vehicle.update(sample, now_us, flight.own_modes)
+        if type(sample) in _FLYING:
+            flight.flies = _flies(vehicle)
         is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, heard_us, now_us)
@@ -122,7 +124,7 @@ def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, no
         flight.reflex.loss_s = round(autopilot.attitude_held_s(parameters), 3)  # single precision on the wire
 
 
-def note_height(flight: FlightContext, now_us: int) -> None:
+def note_height(flight: FlightContext) -> None:
     """Note the height, whether it flies, and whether it has left the ground: a hit that pushes it down undoes none."""
     vehicle, origin = flight.vehicle, flight.origin_ned_m
     latest, heard_us, height_m = vehicle.history.latest, vehicle.last_position_us, None
@@ -135,9 +137,14 @@ def note_height(flight: FlightContext, now_us: int) -> None:
         flight.has_climbed = True
     elif height_m is None or vehicle.stands:
         flight.has_climbed = False
-    if _flies(vehicle) and not flight.is_wreck:
-        flight.flew_us = now_us
-    flight.may_crash = flight.flew_us is not None and now_us - flight.flew_us < LIES_US
+    if flight.flies and not flight.is_wreck:
+        flight.flew_us = flight.stepped_us
+    stepped_us, flew_us = flight.stepped_us, flight.flew_us
+    flight.may_crash = stepped_us is not None and flew_us is not None and stepped_us - flew_us < LIES_US
+
+
+# What tells whether it flies.
+_FLYING = frozenset((messages.Heartbeat, messages.ExtendedState, messages.AttitudeTarget))
 
 
 def _flies(vehicle: Vehicle) -> bool:

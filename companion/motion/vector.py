@@ -19,8 +19,9 @@ def along(vector: Vector3, normal: Vector3) -> float:
 
 def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
     """The component of a vector along a unit normal, and the vector without it."""
-    size = along(vector, normal)
-    return size, plus(vector, -size, normal)
+    (u, v, w), (a, b, c) = vector, normal
+    along = u * a + v * b + w * c
+    return along, (u - along * a, v - along * b, w - along * c)
 
 
 def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:

@@ -35,6 +35,9 @@ class Reaction(NamedTuple):
     notices: Sequence[Notice]
 
 
+NOTHING_SHOWN = Reaction((), False, ())
+
+
 class LeftWrong(NamedTuple):
     """What a vehicle's own estimate has wrong after a hit, and what pushes it; local NED. `share`: of them, by now."""
 
@@ -81,13 +84,15 @@ class Reflex:
         """Take the samples received since the last step, in order; call it without any, too."""
         impacts, notices = advance(self.monitor, samples, situation, now_us)
         # A crash is told where no hit is looked for, too.
-        found = [each for each in impacts if each.impact.is_collision and not situation.off_reason]
+        found = [each for each in impacts if each.impact.is_collision and not situation.off_reason] if impacts else []
         held = None if found else self._held(samples, situation)
         if not situation.is_wreck:
             notices += filter(None, map(self._contact_notice, impacts))
         if held is not None:
             found = [held]
             notices.append(_held_notice(held))
+        if not impacts and not notices:
+            return NOTHING_SHOWN
         return Reaction(found, any(each.impact.is_ground for each in impacts), notices)
 
     def _contact_notice(self, estimate: ImpactEstimate) -> Notice | None:

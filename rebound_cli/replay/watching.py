@@ -46,7 +46,7 @@ class Circumstances:
         vehicle = guard.vehicle
         armed, landed = vehicle.armed, vehicle.landed
         observe(guard, told, now_us)
-        note_height(guard, now_us)
+        note_height(guard)
         guard.reflex.crash.update(told, guard.height_m, vehicle.landed)
         if self._wreck is not None and guard.is_wreck:
             self._wreck.step(guard, Inputs(), now_us)

@@ -81,8 +81,9 @@ def _may_be_down(flight: FlightContext) -> bool:
         return False
     if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
         return True
-    flight.foreign_mode.update(True, flight.trajectory_us)
-    return flight.foreign_mode.lasts_us <= DISARM_NEWS_US
+    if flight.foreign_mode_since_us is None:
+        flight.foreign_mode_since_us = flight.trajectory_us
+    return flight.trajectory_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
 
 
 def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition | None:
@@ -177,15 +178,16 @@ def taken_by(flight: FlightContext, requested_mode: int | None, others: str) -> 
     """
     holder, report = who_decided(flight, requested_mode), flight.vehicle.mode
     if holder is None or report is None:
-        flight.foreign_mode.update(False, flight.trajectory_us)
+        flight.foreign_mode_since_us = None
         return None
     autopilot = flight.vehicle.autopilot
     is_late = autopilot.wants_setpoints_first and autopilot.setpoints in (flight.expected_mode, requested_mode)
     is_late &= report.intended_custom_mode in (None, autopilot.setpoints)
     is_low = flight.height_m is not None and flight.height_m < flight.mission.companion.min_detection_height_m
     if holder == "failsafe" and is_late and not is_low:
-        flight.foreign_mode.update(True, flight.trajectory_us)
-        if flight.foreign_mode.lasts_us < RETURNS_US:
+        if flight.foreign_mode_since_us is None:
+            flight.foreign_mode_since_us = flight.trajectory_us
+        if flight.trajectory_us - flight.foreign_mode_since_us < RETURNS_US:
             return None
     return f"{'a failsafe of the vehicle' if holder == 'failsafe' else others} took over in {flight.vehicle.mode_name}"
 

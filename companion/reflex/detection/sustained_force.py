@@ -73,7 +73,8 @@ class SustainedForceMonitor:
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
         self.imu_count += 1
-        self.measured_frd_m_s2 = towards(self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count)
+        (x, y, z), (a, b, c), share = self.measured_frd_m_s2, specific_force_frd_m_s2, 1.0 / self.imu_count
+        self.measured_frd_m_s2 = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
 
     def step(
         self, sample: LocalPosition, strapdown: Strapdown, goal_ned_m: Vector3 | None, is_free: bool, may_tip: bool
