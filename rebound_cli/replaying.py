@@ -26,7 +26,7 @@ def run_replay(options: Namespace) -> int:
     1 when they are not what was expected, when a flight did not come again, or when nothing was watched.
     """
     if options.least_watched is not None and options.expect != 0:
-        raise ConfigurationError("--least-watched belongs to --expect 0: leave it out here.")
+        raise ConfigurationError("--least-watched belongs to --expect none: leave it out here.")
     console = console_for(False)
     replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"

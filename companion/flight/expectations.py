@@ -44,22 +44,25 @@ def _begun(flight: FlightContext, label: str, item: items.ExpectItem, now_us: in
 
 
 def review(flight: FlightContext, now_us: int, is_over: bool = False) -> None:
-    """Look at those that are still open.
-
-    `is_over`: a hit that has not come will not, and none is none. Of steps that the flight has not come to what is said
-    of the whole flight counts, and nothing else is met.
-    """
+    """Look at those that are still open. `is_over`: a hit that has not come will not, and none is none."""
     for expectation in flight.expectations:
         if expectation.report.met is None:
             _look(flight, expectation, now_us, is_over)
+    if is_over and flight.armed_at_us is not None:
+        _judge_the_rest(flight, now_us)
+
+
+def _judge_the_rest(flight: FlightContext, now_us: int) -> None:
+    """Those that the flight has not come to: what is said of the whole flight counts, and nothing else is met."""
     begun = {expectation.report.label for expectation in flight.expectations}
-    for step in flight.steps[flight.step_index :] if is_over and flight.armed_at_us is not None else ():
-        if isinstance(step.action, items.ExpectItem) and step.label not in begun:
-            expectation = _begun(flight, step.label, step.action, now_us)
-            if isinstance(step.action.check, items.ExpectHits | items.ExpectRecovered | items.ExpectFlightTime):
-                _look(flight, expectation, now_us)
-            else:
-                _decide(flight, expectation, now_us, False, "the flight did not come to it")
+    for step in flight.steps[flight.step_index :]:
+        if not isinstance(step.action, items.ExpectItem) or step.label in begun:
+            continue
+        expectation = _begun(flight, step.label, step.action, now_us)
+        if isinstance(step.action.check, items.ExpectHits | items.ExpectRecovered | items.ExpectFlightTime):
+            _look(flight, expectation, now_us)
+        else:
+            _decide(flight, expectation, now_us, False, "the flight did not come to it")
 
 
 def _look(flight: FlightContext, expectation: Expectation, now_us: int, is_over: bool = False) -> None:

@@ -31,5 +31,5 @@ def _kept_whole(file: BinaryIO, path: Path) -> Iterator[None]:
         # Without this a file system may know the new name before the content.
         os.fsync(file.fileno())
     except OSError:
-        path.unlink()
+        path.unlink(missing_ok=True)
         raise

@@ -64,7 +64,7 @@ def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Pa
             try:
                 row = done.result()
             except (BrokenExecutor, OSError) as error:
-                # A worker that was killed, or a full disk: what the others have flown is kept.
+                # A full disk, or a worker that was killed, with which the pool flies no more: what was flown is kept.
                 row = row_of(case, None, f"failed: {error}")
             left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
             hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"

@@ -257,6 +257,14 @@ def test_a_mode_that_mavsdk_asks_for_is_a_choice_also_while_the_guard_holds_and_
     assert not joined.air.guard.core.flight.awaits_choice
 
 
+def test_a_guard_that_was_never_started_has_nothing_to_give_back(monkeypatch):
+    joined = Joined(monkeypatch)
+    monkeypatch.setattr(joined.link, "release", lambda: joined.link.sent.append("released"), raising=False)
+    monkeypatch.setattr(joined.guard._changed, "wait_for", lambda *_: pytest.fail("it waits"))
+    joined.guard.stop()
+    assert joined.link.sent == ["released"]
+
+
 def test_a_guard_is_started_once(monkeypatch):
     joined = Joined(monkeypatch)
     joined.guard._thread = SimpleNamespace(ident=1)

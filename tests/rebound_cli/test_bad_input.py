@@ -5,12 +5,14 @@ import os
 import socket
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import pytest
 
 from companion.mission.model import Mission
 from companion.reflex.config import GuardsConfig
 from rebound_cli import exit_codes
+from rebound_cli.__main__ import run
 from rebound_cli.inputs.documents import DocumentError, apply_overrides, load_document, parse_document, validated
 from rebound_cli.inputs.inputs import mission_from, world_from
 from rebound_cli.main import main
@@ -103,7 +105,7 @@ CONNECTED, GUARDS = ("fly", SQUARE, "--connect"), "companion.estimate.guards.cen
         (("fly", SQUARE, "--lockstep", "--instance", "3"), ("--instance belongs to --sim px4",)),
         (("sim", "--sensor-rate", "500"), ("--sensor-rate belongs to --autopilot px4",)),
         (("sim", "--autopilot", "px4", "--signing-key", "key"), ("--signing-key belongs to the built-in autopilot",)),
-        (("replay", "none.ulg", "--least-watched", "0.9"), ("--least-watched belongs to --expect 0",)),
+        (("replay", "none.ulg", "--least-watched", "0.9"), ("--least-watched belongs to --expect none",)),
         (("init", "new.yaml", "--from", "square", "--example", "guard"), ("leave one of them out",)),
         (("check", WALL, "--set", "sim.wind_ned_m_s=[1e10, 0, 0]"), ("no such number has a size above 1,000,000,000",)),
         (("status", "--socket", "/nowhere"), ("Nothing answers at /nowhere",)),
@@ -141,6 +143,12 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):
     result = run_here(*command)
     assert result.returncode == 2 and words in result.stderr and "Traceback" not in result.stderr
+
+
+def test_ctrl_c_before_anything_is_loaded_is_one_sentence_too(monkeypatch, capsys):
+    monkeypatch.setattr("rebound_cli.main.main", Mock(side_effect=KeyboardInterrupt))
+    assert run() == exit_codes.INTERRUPTED
+    assert capsys.readouterr().err == "rebound: ended at once.\n"
 
 
 def test_nothing_waits_to_arm_a_vehicle_that_nobody_has_looked_at_and_none_for_a_simulated_one(tmp_path):

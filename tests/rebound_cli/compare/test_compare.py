@@ -47,8 +47,8 @@ def test_a_dask_scheduler_s_workers_fly_as_this_machine_s_cores_do(tmp_path):
     assert there.read_bytes() == here.read_bytes()
 
 
-def test_a_worker_that_is_killed_costs_its_own_flight_alone(tmp_path):
-    # Given workers of which the second one is killed, as for the memory that it takes
+def test_what_was_flown_before_a_worker_was_killed_is_kept(tmp_path):
+    # Given a worker that is killed in the second flight, as for the memory that it takes
     cases = [Case("paper", None, seed, ()) for seed in (1, 2)]
     done, killed = Future(), Future()
     done.set_result(row_of(cases[0], None, "flown"))

@@ -43,6 +43,20 @@ def test_a_short_flight_beside_the_simulated_vehicle(tmp_path):
         assert_comes_again(folder)
 
 
+def test_what_is_known_of_a_flight_is_told_where_its_simulated_vehicle_is_killed(tmp_path):
+    folder = tmp_path / "run"
+    process = start("fly", WALL, "--sim", *command.QUICK, "--json", "--out", folder)
+    wait_for_event(folder, "armed")
+    (vehicle,) = set(command.processes_naming(folder)) - {process.pid}
+    os.kill(vehicle, signal.SIGKILL)
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 1 and stderr.endswith("ended by itself: killed by signal 9\n")
+    summary = json.loads(stdout)
+    assert summary == json.loads((folder / "summary.json").read_text())
+    assert (summary["outcome"], summary["missed_contacts"]) == ("failed", None)
+    assert "killed by signal 9" in summary["reason"] and (folder / "report.html").exists()
+
+
 def test_a_second_ctrl_c_ends_at_once(tmp_path):
     # Given a vehicle that has stopped answering, so that the first Ctrl-C has to wait
     folder = tmp_path / "run"

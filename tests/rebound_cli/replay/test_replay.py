@@ -67,6 +67,11 @@ def test_a_folder_from_before_the_baselines_left_the_drone_is_decided_again(copi
     assert_comes_again(copied)
 
 
+def test_without_the_versions_that_flew_it_a_flight_is_decided_again(copied):
+    (copied / "versions.json").unlink()
+    assert_comes_again(copied)
+
+
 def test_a_changed_packet_or_an_event_that_does_not_come_again_is_found(copied):
     # Given a flight in whose log one setpoint has another byte
     recording = read_recording(copied)
