@@ -111,7 +111,7 @@ $(WHEEL)/%: requirements/%.txt
 	$@/bin/python -m pip check
 
 paper: $(READY)
-	$(BIN)/python -m bench paper --seeds 50
+	$(BIN)/python -m bench paper
 
 schema: $(READY)
 	$(BIN)/rebound check --schema > missions/schema.json

@@ -4,6 +4,7 @@ import json
 import time
 from argparse import Namespace
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -97,9 +98,12 @@ def run_fly(options: Namespace) -> int:
             followed = Followed() if is_simulated else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
             try:
-                flown = _fly(flight, connection, options)
-            finally:
-                recorder.close()
+                with closing(recorder):
+                    flown = _fly(flight, connection, options)
+            except BaseException:
+                if interrupts.reason is not None and not (folder / run_folder.TLOG_NAME).stat().st_size:
+                    _forget(folder, options.mission)
+                raise
         return _finish(flight, flown, options.json)
 
 
@@ -133,6 +137,12 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inp
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:
         run_folder.write_yaml(folder / run_folder.AIRFRAME_NAME, world.airframe.model_dump(mode="json"))
+
+
+def _forget(folder: Path, mission_file: Path) -> None:
+    """What was ended before a vehicle was there is no flight. A file that a person flies from there stays."""
+    names = (run_folder.MISSION_NAME, run_folder.RESOLVED_NAME, run_folder.AIRFRAME_NAME, run_folder.VEHICLE_LOG_NAME)
+    run_folder.forget(folder, *(name for name in names if (folder / name).resolve() != mission_file.resolve()))
 
 
 def _fly_connected(

@@ -67,7 +67,7 @@ def _recorded(
     with _reporting(console, folder):
         run_folder.write_yaml(folder / run_folder.GUARD_NAME, settings)
         run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-    recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
+    recorder = FlightRecorder(folder, Background("log"), ring.make_room)
     guard, kept_out = Guard(config), 0 if between is None else between.kept_out
     end = "cut off"
     try:
@@ -85,9 +85,7 @@ def _recorded(
                     for kind, said in guard.look_at(between, now_us):
                         recorder.record_input(now_us, kind, **said)
 
-            loop.run(
-                beside, lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None
-            )
+            loop.run(beside, lambda: ring.is_long and guard.armed is False and interrupts.reason is None)
             end = "goes on in the next folder"
     finally:
         recorder.close()

@@ -86,6 +86,8 @@ def run(options: argparse.Namespace, program: str) -> int:
         # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
         sys.stderr.close()
         return code
+    except UnicodeEncodeError as error:
+        said = f"{error.object[error.start : error.end]!a} is no character that can be written: leave it out."
     except OSError as error:
         # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
         if error.filename is None and error.errno not in _DISK_ERRORS:

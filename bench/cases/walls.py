@@ -62,15 +62,14 @@ def approach(
     heading_deg: float = 0.0,
     height_m: float = HEIGHT_M,
     cruise_s: float = CRUISE_S,
-    slant_deg: float = 0.0,
     companion: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Mission towards `heading_deg` at a wall square to it, or turned from there by `slant_deg`.
+    """Mission towards `heading_deg` at a wall square to it.
 
     The nose stays north: the heading chooses the arms that are hit.
     """
     north, east = math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))
-    facing = math.radians(heading_deg + 180.0 + slant_deg)
+    facing = math.radians(heading_deg + 180.0)
     ramp_m = speed_m_s**2 / (2.0 * ACCELERATION_M_S2)
     wall_m = ramp_m + cruise_s * speed_m_s
     target_m = wall_m + ramp_m + BEHIND_S * speed_m_s

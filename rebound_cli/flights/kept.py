@@ -190,8 +190,9 @@ def limits_of(config: DiskConfig, file_system_bytes: int) -> tuple[int, int]:
 class Ring:
     """The oldest go where all together pass a budget or the disk has too little left; never the present one."""
 
-    def __init__(self, present: Path, config: DiskConfig) -> None:
-        self._present, self._runs = present, present.parent
+    def __init__(self, present: Path, config: DiskConfig, is_named: bool = False) -> None:
+        """`is_named`: the present one stands where a person wants it, beside what is none of ours."""
+        self._present, self._runs, self._is_named = present, present.parent, is_named
         self._config = config
         self._due_us = 0
         self._has_room = True
@@ -208,11 +209,14 @@ class Ring:
             raise OSError(errno.ENOSPC, text)
 
     def _look(self) -> None:
+        disk = shutil.disk_usage(self._runs)
+        max_use_bytes, keep_free_bytes = limits_of(self._config, disk.total)
+        if self._is_named:
+            self._has_room = disk.free >= min(LAST_BYTES, keep_free_bytes)
+            return
         # What a power cut left of one that was being removed.
         for folder in self._runs.glob(f"{_GOING}*"):
             shutil.rmtree(folder, ignore_errors=True)
-        disk = shutil.disk_usage(self._runs)
-        max_use_bytes, keep_free_bytes = limits_of(self._config, disk.total)
         others = [each for each in kept_flights(self._runs) if each.is_ours and each.folder != self._present]
         present_bytes = size_of(self._present) if self._present.exists() else 0
         used_bytes = sum(flight.size_bytes for flight in others) + present_bytes
@@ -225,13 +229,14 @@ class Ring:
         self.is_long = self._has_room and present_bytes > max(max_use_bytes // _FLIGHTS_A_BUDGET, LAST_BYTES)
 
 
-def folder_with_room(out: Path | None, name: str, config: DiskConfig) -> tuple[Path, Ring | None]:
-    """A flight's folder, and whose `make_room` a recorder asks before packets: None where a person has named it.
+def folder_with_room(out: Path | None, name: str, config: DiskConfig) -> tuple[Path, Ring]:
+    """A flight's folder, and whose `make_room` a recorder asks before packets.
 
     On a disk that others have filled the oldest flights go before it is made. Raises RunFolderError, OSError.
     """
     if out is not None:
-        return run_folder.create_run_folder(out, name), None
+        folder = run_folder.create_run_folder(out, name)
+        return folder, Ring(folder, config, is_named=True)
     with suppress(OSError):
         Ring(run_folder.RUNS_FOLDER / "next", config).make_room(LOOK_EVERY_US)
     folder = run_folder.create_run_folder(None, name)

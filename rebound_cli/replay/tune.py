@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 from companion.mission.config import CompanionConfig
 from companion.shell.files import write_whole
 from rebound_cli.flights.kept import hits_in, hits_text
-from rebound_cli.inputs.documents import parse_document, refuse_existing, validated
+from rebound_cli.inputs.documents import parse_document, refuse_existing, refuse_special, validated
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError, clipping_text
 from rebound_cli.logs.reader import read_log
@@ -55,6 +55,8 @@ def run_tune(options: Namespace) -> None:
     """Print what the flights say and the settings; with --out write these. Raises LogError, ConfigurationError."""
     out: Path | None = options.out
     refuse_existing(out)
+    if out is not None:
+        refuse_special(out)
     config = companion_settings(options.companion)
     flights = [read_healthy(path, config) for path in options.logs]
     # What follows takes longer than such a flight.

@@ -38,7 +38,9 @@ class WatchServer(ThreadingHTTPServer):
         try:
             super().__init__((host, port), _Handler)
         except (OSError, UnicodeError) as error:
-            raise ReboundError(f"{host}:{port}: nothing can be served there: {error}.") from error
+            raise ReboundError(
+                f"{host}:{port}: nothing can be served there: {error}; give another --host or --port."
+            ) from error
         self.page = live_page(unseen_flight(folder)).encode()
         self.names = _LOOPBACK if host in _LOOPBACK else ()
         self._tail = Tail(folder)

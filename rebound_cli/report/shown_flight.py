@@ -2,11 +2,13 @@
 
 import json
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.memory.patch import Patch
 from companion.mission.config import CompanionConfig
@@ -158,11 +160,17 @@ def _world(folder: Path) -> dict[str, Any]:
     airframe = folder / run_folder.AIRFRAME_NAME
     if not airframe.exists():
         return {}
-    document, flown = load_document(settings_file(folder)), load_document(airframe).data
+    document = load_document(settings_file(folder))
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
-    with run_folder.reading(airframe):
-        places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
-        return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
+    try:
+        with run_folder.reading(airframe):
+            flown = load_document(airframe).data
+            places = [tuple(rotor["place_frd_m"]) for rotor in flown.get("rotors") or ()]
+            return {"scene": scene, "rotors_frd_m": places, "stop_s": flown["arms"]["stop"]["contact_time_s"]}
+    except ReboundError as error:
+        # It draws the vehicle, and decides nothing.
+        warnings.warn(f"{str(error).rstrip('.')}; the flight is shown without it", stacklevel=1)
+        return {"scene": scene}
 
 
 def _patches(path: Path) -> Sequence[Patch]:

@@ -83,9 +83,9 @@ def create_run_folder(out: Path | None, mission_name: str) -> Path:
         number += 1
 
 
-def forget(folder: Path) -> None:
-    """Remove what a guard has written there, and the folder where nothing else is in it."""
-    for name in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME, SUMMARY_NAME, GUARD_NAME, VERSIONS_NAME):
+def forget(folder: Path, *more: str) -> None:
+    """Remove what a guard, and `more` that a flight has written there, and the folder where nothing else is in it."""
+    for name in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME, SUMMARY_NAME, GUARD_NAME, VERSIONS_NAME, *more):
         (folder / name).unlink(missing_ok=True)
     with suppress(OSError):
         folder.rmdir()

@@ -59,14 +59,14 @@ def test_the_share_of_a_hit_that_was_received():
 
 
 def test_every_flight_states_the_papers_detector_law_and_gain():
-    for mission in (flight.mission for study in command.STUDIES for flight in study.flights(1)):
+    for mission in (flight.mission for study in command.STUDIES for flight in study.flights()):
         assert mission["companion"]["detector"] == "lateral"
         assert mission["recovery"] == {"law": "paper", "gamma": 0.5}
         BaselineMission.model_validate(dict(mission))
 
 
 def test_the_sample_scenario_agrees_and_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red():
-    sample = fly(flights.SAMPLE.flights(1)[0])
+    sample = fly(flights.SAMPLE.flights()[0])
     findings = flights.SAMPLE.conclude(pd.DataFrame([sample]))
     assert {row["verdict"] for row in findings.rows} == {PASSED}
     names = {text.get_text() for text in findings.pictures["sample_scenario.png"].legends[0].get_texts()}

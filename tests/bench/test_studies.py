@@ -1,4 +1,4 @@
-"""Studies, each flown and judged as stated: the table of faults, ablations, flights to the ground."""
+"""Studies, each flown and judged as stated: the table of faults, and ablations."""
 
 import math
 import random
@@ -12,7 +12,6 @@ from bench.faults.injectors import simulated, taken
 from bench.fly.air import COMPLETED, HANDED_OVER, POSCTL, Air, Expected, Fault, Injector, When
 from bench.fly.packets import ARM, SET_MODE, made, outside
 from bench.studies.ablation import RULES, Rule, flights_table, switched
-from bench.studies.detection.landings import judged
 from bench.studies.faults import FaultCase, flown_with, work_out_fault
 from companion.mavlink.encode import COMPONENT_ID
 from companion.motion.vector import ZERO
@@ -166,31 +165,3 @@ def test_the_table_counts_what_is_lost_without_a_rule():
     assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
     hand = next(line for line in lines if line.startswith("| hand "))
     assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
-
-
-TOUCHED_S = 5.0
-LANDED, FALLEN = False, True
-
-
-@pytest.mark.parametrize(
-    ("is_fall", "reported", "outcome", "wrong"),
-    [
-        (LANDED, [], "nothing", ""),
-        (LANDED, [("landing", 0.01)], "landing", ""),
-        (LANDED, [("landing", 0.01), ("floor", 0.5)], "landing", "floor in a landing"),
-        (LANDED, [("crash", 0.01)], "crash", "crash in a landing"),
-        (LANDED, [("wall", -1.0)], "nothing", "wall before the touch"),
-        (FALLEN, [], "nothing", "nothing in a crash"),
-        (FALLEN, [("landing", 0.01)], "landing", "landing in a crash"),
-        (FALLEN, [("crash", 0.01), ("crash", 0.5), ("landing", 0.9)], "crash", ""),
-        (FALLEN, [("crash", 0.01), ("wall", 0.5)], "crash", "wall after the crash"),
-        (FALLEN, [("crash", 0.3)], "crash", "0.25 s late"),
-        (FALLEN, [("ceiling", -0.2), ("crash", 0.01)], "crash", "ceiling before the touch"),
-    ],
-)
-def test_a_way_to_the_ground_is_judged_by_all_that_was_reported(is_fall, reported, outcome, wrong):
-    # Given impacts of these kinds, so many seconds after the touch, whose hardest moment is 0.05 s after it
-    rows = [{"kind": kind, "sample_s": TOUCHED_S + after_s} for kind, after_s in reported]
-    assert judged(is_fall, round(1e6 * TOUCHED_S), round(1e6 * TOUCHED_S) + 50_000, rows) == (outcome, wrong)
-    # And one that never touches the ground shows nothing
-    assert judged(is_fall, None, None, rows) == ("not there", "the ground was not reached")

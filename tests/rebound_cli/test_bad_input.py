@@ -18,7 +18,7 @@ from rebound_cli.inputs.inputs import mission_from, world_from
 from rebound_cli.main import main
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.hil.parameters import px4_parameters
-from tests.rebound_cli.command import ROOT, SQUARE, WALL, assert_one_clear_sentence, run_here
+from tests.rebound_cli.command import ROOT, SQUARE, WALL, assert_one_clear_sentence, run_here, start
 
 
 def test_a_port_in_use(tmp_path):
@@ -90,6 +90,7 @@ CONNECTED, GUARDS = ("fly", SQUARE, "--connect"), "companion.estimate.guards.cen
         (("logs", "list", "--runs", "nowhere"), ("nowhere is no folder",)),
         (("report", WALL), (f"{WALL} is no flight's folder; `rebound replay` reads logs",)),
         (("check", 300 * "a"), ("File name too long",)),
+        (("tune", "none.ulg", "--out", "nowhere/settings.yaml"), ("nowhere is no folder that can be written to",)),
         ((*CONNECTED, "the drone"), ("udpin://HOST:PORT",)),
         (("preflight", "--connect", "nowhere"), ("'nowhere' is not a connection address",)),
         (("sim", "--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),
@@ -143,6 +144,13 @@ def test_what_cannot_be_done_is_one_sentence_that_names_it(command, words):
 def test_wrong_words_exit_with_2_and_name_the_wrong_one(command, words):
     result = run_here(*command)
     assert result.returncode == 2 and words in result.stderr and "Traceback" not in result.stderr
+
+
+def test_text_that_no_output_can_hold_is_one_sentence():
+    process = start("check", WALL, "--no-picture", "--set", r'description="a\ud800"')
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said == r"rebound: '\ud800' is no character that can be written: leave it out." + "\n"
 
 
 def test_ctrl_c_before_anything_is_loaded_is_one_sentence_too(monkeypatch, capsys):

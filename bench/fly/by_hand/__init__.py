@@ -1,1 +1,1 @@
-"""Vehicles that are flown by sticks or to the ground, each step watched by a guard."""
+"""Vehicles that are flown by sticks, each step watched by guards."""

@@ -65,7 +65,7 @@ class Pilot:
             self._next = self._rise
         if self._next == self._rise and flight.height_m > BEGUN_M:
             self._next, self._chosen, self._end_s = self._vigorous, self._mode, now_s + FLOWN_S
-            flight.watch_for_ground()
+            flight.looks_for_ground = True
         if self._next == self._vigorous:
             self._tilts_deg.append(flight.tilt_deg)
         for guard in self._guards:

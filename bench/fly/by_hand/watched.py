@@ -1,7 +1,7 @@
 """A vehicle, whoever watches it and a ground station on virtual time; impacts that are reported, beside the truth."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,9 +9,7 @@ import numpy as np
 
 from bench.fly.lockstep import Stepped
 from bench.fly.station import GroundStation
-from companion.autopilot.known import GUARDED_MODES
-from companion.companion import Companion, StepResult
-from companion.guard.config import GuardConfig
+from companion.companion import StepResult
 from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.detection.detector import Impact, Phase
@@ -42,40 +40,31 @@ class Sticks:
 class Watcher:
     """Who watches, and what was reported."""
 
-    program: Guard | Companion
+    guard: Guard
     reported: list[Row] = field(default_factory=list)
     watched_s: float = 0.0
     impact: Impact | None = None  # the newest
 
 
-def guard_in_any_mode(settings: Mapping[str, Any]) -> Guard:
-    """It watches manual flight, too; with these settings of the companion."""
-    return Guard(GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings}))
-
-
 class GuardedFlight(Stepped):
     """With a ground station. The world is the level ground alone."""
 
-    def __init__(self, vehicle: SimulatedVehicle, *programs: Companion | Guard) -> None:
-        super().__init__(vehicle, *programs)
-        self.watchers = [Watcher(program) for program in programs]
+    def __init__(self, vehicle: SimulatedVehicle, *guards: Guard) -> None:
+        super().__init__(vehicle, *guards)
+        self.watchers = [Watcher(guard) for guard in guards]
         self.station = GroundStation(vehicle, LinkKind.NORMAL)
         for link in self.links:
             link.introduce()
         self._body, self._depth_m = vehicle.state.body, vehicle.state.depth_m
         self._sticks_s = self._beat_s = 0.0
         self._before = np.zeros(3)
-        self.looks_for_ground = False
-        self.touched_us: int | None = None  # first touch of the ground since the latest `watch_for_ground`
-        self.last_touch_us: int | None = None
-        self.hardest_m_s2 = 0.0  # since that touch: the largest specific force, mean over an interval
-        self.hardest_us: int | None = None
-        self.tilt_at_touch_deg = self.sink_at_touch_m_s = 0.0
+        self.looks_for_ground = False  # once the vehicle is off it
+        self.has_touched = False
 
     @property
     def status(self) -> Status:
         """As the first watcher sees it."""
-        return self.watchers[0].program.status()
+        return self.watchers[0].guard.status()
 
     @property
     def height_m(self) -> float:
@@ -93,10 +82,6 @@ class GuardedFlight(Stepped):
         _, x, y, _ = self._body[6:10].tolist()
         return math.degrees(math.acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
 
-    def watch_for_ground(self) -> None:
-        """From now on a touch of the ground counts: the vehicle is off it."""
-        self.looks_for_ground, self.touched_us = True, None
-
     def fly_sticks(self, sticks: Callable[[], Sticks]) -> None:
         """Send the sticks where they are due."""
         if self.time_s < self._sticks_s:
@@ -111,41 +96,31 @@ class GuardedFlight(Stepped):
         self._before[:] = self._body[3:6]
         results = super().step()
         self.station.hear()
-        if self.looks_for_ground:
-            self._note_ground()
+        self.has_touched |= self.looks_for_ground and self._is_touching()
         for watcher in self.watchers:
             self._note_impact(watcher)
         return results
 
-    def _note_ground(self) -> None:
+    def _is_touching(self) -> bool:
         """A contact with a stiff frame may begin and end within an interval: its force shows it then."""
-        now_us = self.vehicle.time_boot_us
         change = (self._body[3:6] - self._before) / (1e-6 * self.vehicle.interval_us)
         change[2] -= GRAVITY_M_S2
-        force_m_s2 = float(np.linalg.norm(change))
-        if float(self._depth_m.max()) > 0.0 or force_m_s2 > STRONGEST_M_S2:
-            self.last_touch_us = now_us
-            if self.touched_us is None:
-                self.touched_us, self.hardest_m_s2 = now_us, 0.0
-                self.tilt_at_touch_deg, self.sink_at_touch_m_s = self.tilt_deg, float(self._before[2])
-        if self.touched_us is not None and force_m_s2 > self.hardest_m_s2:
-            self.hardest_m_s2, self.hardest_us = force_m_s2, now_us
+        return float(self._depth_m.max()) > 0.0 or float(np.linalg.norm(change)) > STRONGEST_M_S2
 
     def _note_impact(self, watcher: Watcher) -> None:
-        monitor = watcher.program.core.reflex.monitor
+        monitor = watcher.guard.core.reflex.monitor
         if monitor.state.phase is not Phase.OFF:
             watcher.watched_s += 1e-6 * self.vehicle.interval_us
         estimate = monitor.estimator.estimate
         if estimate is None or estimate.impact is watcher.impact:
             return
         watcher.impact = impact = estimate.impact
-        now_us = self.vehicle.time_boot_us
         watcher.reported.append(
             {
                 "kind": impact.kind.value,
                 "evidence": impact.evidence.value,
                 "sample_s": round(1e-6 * impact.sample_time_boot_us, 3),
-                "since_touch_s": None if self.last_touch_us is None else round(1e-6 * (now_us - self.last_touch_us), 3),
+                "in_the_air": not self.has_touched,
                 "tilt_deg": round(self.tilt_deg, 1),
                 "turning_rad_s": round(math.hypot(*self._body[10:13].tolist()), 2),
                 "speed_m_s": round(math.hypot(*self.velocity_ned_m_s[:2]), 2),

@@ -16,7 +16,6 @@ import yaml
 
 from bench.fly.campaign import Json
 from bench.rows.tables import at_most_an_hour, table
-from bench.studies.detection.landings import CRASH_WITHIN_S
 from bench.studies.study import Shown, page_path, write_page
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import LogError
@@ -31,6 +30,8 @@ LABELS = Path(__file__).with_name("flights.yaml")
 ONE_EVENT_US = 2_000_000
 # A label is read off a page.
 LABEL_S = 1.0
+# A crash is reported within this time of its greatest deceleration.
+CRASH_WITHIN_S = 0.2
 # The label of what was told where nothing was, with the reason above it.
 NOTHING = "nothing"
 WORST_FIRST = ("crash", "collision", "touchdown")

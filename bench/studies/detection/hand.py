@@ -3,7 +3,7 @@
 import math
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +12,13 @@ import pandas as pd
 
 from bench.cases.vehicles import AIRFRAMES, vehicle_of
 from bench.fly.by_hand.hand_pilot import Pilot, wishes
-from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row, guard_in_any_mode
+from bench.fly.by_hand.watched import IMU_HZ, STICKS_S, GuardedFlight, Row
 from bench.fly.campaign import Results
 from bench.rows.tables import at_most_an_hour, by_each
 from bench.studies.study import Shown, run_study, seeds_of
+from companion.autopilot.known import GUARDED_MODES
+from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -108,7 +111,7 @@ def fly_by_hand(case: HandCase) -> Row:
     air = str(rng.choice(list(AIR)))
     scene = Scene.model_validate({"faults": AIR[air](rng)})
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
-    guards = [guard_in_any_mode({**built.settings, "streams": {"highres_imu_hz": float(hz)}}) for hz in IMU_HZ]
+    guards = [_guard({**built.settings, "streams": {"highres_imu_hz": float(hz)}}) for hz in IMU_HZ]
     flight = GuardedFlight(vehicle, *guards)
     tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode, guards).fly()
     return {
@@ -119,12 +122,17 @@ def fly_by_hand(case: HandCase) -> Row:
         "air": air,
         "flown_s": round(len(tilts) * STICKS_S, 1),
         "tilt_deg": [round(float(np.percentile(tilts, at)), 1) for at in (50, 90, 100)] if tilts else [],
-        "touched": flight.touched_us is not None,
+        "touched": flight.has_touched,
         "watched": [
             {"imu_hz": imu_hz, "watched_s": round(watcher.watched_s, 1), "reported": watcher.reported}
             for imu_hz, watcher in zip(IMU_HZ, flight.watchers, strict=True)
         ],
     }
+
+
+def _guard(settings: Mapping[str, Any]) -> Guard:
+    """It watches manual flight, too; with these settings of the companion."""
+    return Guard(GuardConfig.model_validate({"modes": (*GUARDED_MODES, "STABILIZED"), "companion": settings}))
 
 
 def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[str, float]]:
@@ -186,4 +194,4 @@ def _figures(flights: pd.DataFrame) -> Row:
 
 
 def _in_the_air(row: Row) -> list[Row]:
-    return [one for one in row["reported"] if one["since_touch_s"] is None]
+    return [one for one in row["reported"] if one["in_the_air"]]

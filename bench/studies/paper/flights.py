@@ -1,4 +1,4 @@
-"""The paper's flights: its sample scenario, its simulation and experiment, its flight tests; walls from any side."""
+"""The paper's flights: its sample scenario, its simulation and experiment, and its flight tests."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from bench.studies.paper.figures import (
     new_figure,
 )
 from bench.studies.paper.single import FOLD_MAX_M
-from bench.studies.paper.study import Findings, Study, claim, flown_table, number
+from bench.studies.paper.study import Findings, Study, claim, flown_table
 from rebound_cli.inputs.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")
@@ -42,7 +42,7 @@ SEEDS = 8
 COMPANION = {"min_detection_height_m": 0.3}
 
 
-def _scenario(seeds: int) -> list[StudyFlight]:
+def _scenario() -> list[StudyFlight]:
     return [StudyFlight({}, pinned(load_mission_document(MISSION_FILE, []).data), "foldable", 1, is_drawn=True)]
 
 
@@ -85,7 +85,7 @@ def _scenario_figure(track: Json) -> Figure:
     return figure
 
 
-def _experiment(seeds: int) -> list[StudyFlight]:
+def _experiment() -> list[StudyFlight]:
     mission = approach(SPEED_M_S, height_m=HEIGHT_M, companion=COMPANION)
     return [StudyFlight({}, mission, "foldable", seed, is_drawn=seed == 1) for seed in range(1, SEEDS + 1)]
 
@@ -127,7 +127,7 @@ BEYOND_M_S = (3.0, 4.0, 5.0)
 TEST_SEEDS = 6
 
 
-def _head_on(seeds: int) -> list[StudyFlight]:
+def _head_on() -> list[StudyFlight]:
     return [
         StudyFlight(
             {"speed_m_s": speed}, approach(speed), airframe, seed, is_drawn=seed == 1 and speed in PAPER_SPEEDS_M_S
@@ -169,57 +169,4 @@ def _flight_tests_figure(airframe: str, flights: pd.DataFrame) -> Figure:
     return figure
 
 
-# --- walls from any side: every direction of the wall to the vehicle's nose
-
-ANY_SIDE_M_S = (1.0, 2.0, 3.0, 4.0, 5.0)
-# Between the flight and the wall's normal, to the left and to the right in turn; beyond the paper.
-SLANT_DEG = 30.0
-GROUPS = (*((airframe, 0.0) for airframe in AIRFRAMES), ("foldable", SLANT_DEG))
-# Turning by this each time fills the circle evenly, however many there are.
-GOLDEN_ANGLE_DEG = 137.508
-# The airframe looks the same from each quarter, and the same from the left as from the right.
-QUARTER_DEG = 90.0
-
-
-def heading_deg(seed: int) -> float:
-    """Direction of flight to the nose, clockwise; the wall stands square to it."""
-    return (seed * GOLDEN_ANGLE_DEG) % 360.0
-
-
-def off_axis_deg(heading: float) -> float:
-    """How far from the nearest of front, right, back and left; 45 meets one guard alone."""
-    return abs((heading + QUARTER_DEG / 2.0) % QUARTER_DEG - QUARTER_DEG / 2.0)
-
-
-def _from_any_side(seeds: int) -> list[StudyFlight]:
-    return [
-        StudyFlight(
-            {"speed_m_s": speed, "heading_deg": heading_deg(seed), "slant_deg": slant_deg},
-            approach(speed, heading_deg(seed), slant_deg=slant_deg if seed % 2 else -slant_deg),
-            airframe,
-            seed,
-        )
-        for airframe, slant_deg in GROUPS
-        for speed in ANY_SIDE_M_S
-        for seed in range(1, seeds + 1)
-    ]
-
-
-def _of_any_side(flights: pd.DataFrame) -> Findings:
-    """By the strictest count, and without what ends the collision before (see `bench/rows/paper.py`)."""
-    square = flights[(flights["hits"] > 0) & (flights["airframe"] == "foldable") & (flights["slant_deg"] == 0.0)]
-    rows = []
-    for speed, flown in square.groupby("speed_m_s"):
-        again, own_m = flown[flown["again"] > 0], float(flown["own_past_m"].max())
-        sides = ", ".join(f"{side:.0f}°" for side in sorted(map(off_axis_deg, again["heading_deg"])))
-        rows += [
-            claim("any side again", (flown["second_hits"] > 0).sum(), speed=speed, flown=len(flown)),
-            claim("any side touched", len(again), speed=speed, flown=len(flown), sides=sides or "none"),
-            claim("any side overshoot", flown["past_m"].max(), speed=speed, own=number(round(own_m, 3))),
-        ]
-    flown_text = flown_table(flights, airframe="airframe", slant_deg="slant [°]", speed_m_s="m/s")
-    return Findings(rows, tables={"Walls from any side, each speed": flown_text})
-
-
 FLIGHT_TESTS = Study("Flight tests", _head_on, _of_head_on)
-ANY_SIDE = Study("Walls from any side", _from_any_side, _of_any_side)

@@ -16,7 +16,7 @@ _, LOST, _, _, LEANING, _, CLIPPED = CAUSES
 CAUSE_M_S, CAUSE_SEEDS = 2.0, 6
 
 
-def _caused(seeds: int) -> list[StudyFlight]:
+def _caused() -> list[StudyFlight]:
     return [
         StudyFlight(
             {"cause": name},
@@ -68,7 +68,7 @@ SAMPLINGS = (
 SLOWEST, FASTEST = (25.0, 4000), (400.0, 2500)
 
 
-def _sampled(seeds: int) -> list[StudyFlight]:
+def _sampled() -> list[StudyFlight]:
     return [
         _sampled_flight(airframe, asked_hz, interval_us, seed)
         for airframe in AIRFRAMES

@@ -110,7 +110,7 @@ def _arm_figure(single: HeadOnHit, rests_mm: float) -> Figure:
     return figure
 
 
-ARM = Study("Parameter identification", lambda seeds: [], _of_arm)
+ARM = Study("Parameter identification", list, _of_arm)
 
 
 # --- the other claims
@@ -151,7 +151,7 @@ def hover_share(mass_kg: float) -> float:
     return float(np.mean(fractions[SETTLING_S * seconds :]))
 
 
-def _flights(seeds: int) -> list[StudyFlight]:
+def _flights() -> list[StudyFlight]:
     off = {"lateral": {"threshold_m_s2": NEVER_M_S2}}
     missions = approach(BOUNCING_M_S, companion=off), approach(BOUNCING_M_S)
     return [StudyFlight({}, mission, "foldable", 1, is_drawn=True) for mission in missions]

@@ -31,13 +31,10 @@ class Findings:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """`flights` is told how many seeds are asked for; `conclude` gets a row of each, in their order.
-
-    Only the study of walls from any side grows with the seeds. The others fly what their pictures and rows need.
-    """
+    """`conclude` gets a row of each flight, in their order."""
 
     title: str
-    flights: Callable[[int], list[StudyFlight]]
+    flights: Callable[[], list[StudyFlight]]
     conclude: Callable[[pd.DataFrame], Findings]
 
 

@@ -211,5 +211,11 @@ def test_room_is_made_before_a_flight_has_a_folder(tmp_path, disk, monkeypatch):
     monkeypatch.setattr(ring.run_folder, "RUNS_FOLDER", tmp_path / "none")
     folder, _ = folder_with_room(None, "guard", DiskConfig())
     assert folder.is_dir()
-    # And in a folder that a person has named nothing is removed
-    assert folder_with_room(tmp_path / "mine", "guard", DiskConfig()) == (tmp_path / "mine", None)
+    # And beside a folder that a person has named nothing is removed, but packets end there, too
+    before = names(tmp_path)
+    folder, mine = folder_with_room(tmp_path / "mine", "guard", DiskConfig.model_validate({"max_use_mb": 0}))
+    mine.make_room(EPOCH_US)
+    disk(tmp_path, LAST_BYTES - 1)
+    with pytest.raises(OSError, match="less than 10 MiB"):
+        mine.make_room(EPOCH_US + LOOK_EVERY_US)
+    assert folder == tmp_path / "mine" and names(tmp_path) == before and not mine.is_long

@@ -144,6 +144,8 @@ def test_ctrl_c_while_waiting_for_px4_ends_everything(tmp_path):
     process.communicate(timeout=30)
     assert process.returncode == 1
     command.wait_until_there(folder, False)
+    # And the folder can be flown to again
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize(
@@ -185,6 +187,7 @@ def test_ctrl_c_while_waiting_for_ardupilot_ends_in_a_sentence(tmp_path):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 1 and "stopped before ArduPilot's SITL was there" in said
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("words", [("fly", SQUARE, "--yes"), ("guard",)], ids=lambda words: words[0])

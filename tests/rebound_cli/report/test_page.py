@@ -344,7 +344,6 @@ def truth_of(**series):
         ("truth.npz", truth_of(**TruthRecorder().series() | {"attitude_wxyz": np.zeros((1, 4))})),
         ("summary.json", b'{"mission": "wall"}'),
         ("obstacles.json", b"["),
-        ("airframe.yaml", b"name: foldable"),
     ],
 )
 def test_of_a_folder_with_a_damaged_file_there_is_a_sentence(wall_folder, tmp_path, capsys, name, content):
@@ -352,6 +351,15 @@ def test_of_a_folder_with_a_damaged_file_there_is_a_sentence(wall_folder, tmp_pa
     (folder / name).write_bytes(content)
     assert main(["report", str(folder)]) == 1
     assert re.fullmatch(rf"rebound: .*{name}: .+ the file is damaged\.\n", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("content", [b"name: foldable", b"name: [", b"\xff"])
+def test_without_a_whole_airframe_the_flight_is_shown_and_it_is_said(wall_folder, tmp_path, content):
+    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
+    (folder / "airframe.yaml").write_bytes(content)
+    with pytest.warns(UserWarning, match="airframe.yaml.*; the flight is shown without it"):
+        data = Opened(page(recorded_flight(folder))).data
+    assert data["obstacles"] and len(data["vehicle"]["arms"]) == 4
 
 
 def test_a_flight_that_was_cut_off_has_one_and_one_in_which_nothing_was_heard_has_none(wall_folder, tmp_path, capsys):
