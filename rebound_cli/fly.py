@@ -24,7 +24,6 @@ from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import AskPerson, Computer, FlightFaultError, Loop, confirm_now, fly_realtime, watched
 from rebound_cli.live.signed_connection import open_signed, refused_packets, unheard_text
 from rebound_cli.live.status import StatusServer, served
-from rebound_cli.replay.recording import Followed
 from rebound_cli.report.showing import offer_page, show_flight, watched_page
 from rebound_cli.results import run_folder
 from rebound_cli.results.ending import ending_text
@@ -48,7 +47,6 @@ class Flight:
     recorder: FlightRecorder
     console: Console
     interrupts: Interrupts
-    followed: Followed | None = None  # where the vehicle is simulated: a drone records, and does no more
 
 
 def run_fly(options: Namespace) -> int:
@@ -95,8 +93,7 @@ def run_fly(options: Namespace) -> int:
         # In lockstep the vehicle waits for the disk as for everything else.
         recorder = FlightRecorder(folder, None if is_lockstep else Background("log"), ring.make_room if ring else None)
         with watched_page(folder, console, options.watch), Interrupts() as interrupts:
-            followed = Followed() if is_simulated else None
-            flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
+            flight = Flight(mission, world, folder, recorder, console, interrupts)
             try:
                 with closing(recorder):
                     flown = _fly(flight, connection, options)
@@ -154,8 +151,6 @@ def _fly_connected(
 ) -> Flown:
     companion, started_s, fault = Companion(flight.mission), time.monotonic(), None
     loop = Loop(companion, connection, Clock(), flight.recorder, flight.console, flight.interrupts, server, computer)
-    if flight.followed is not None:
-        loop.step = partial(flight.followed.step, companion)
     try:
         fly_realtime(companion, loop, confirm)
     except FlightFaultError as error:
@@ -221,9 +216,7 @@ def _fly_stepped(flight: Flight, vehicle: "SimulatedVehicle | ArduPilotVehicle")
     from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
     from sim_vehicle.shell.truth_file import save_truth
 
-    flown = fly_mission_lockstep(
-        flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console, flight.followed
-    )
+    flown = fly_mission_lockstep(flight.mission, vehicle, flight.recorder, flight.interrupts, flight.console)
     save_truth(flight.folder / run_folder.TRUTH_NAME, vehicle.truth, EPOCH_US)
     return flown
 
@@ -244,8 +237,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
         console.print(f"\n{writer.loss} ({writer.lost} steps)")
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
-        if flight.followed is not None:
-            show_flight(flight.folder, flight.followed, console)
+        if world is not None:
+            show_flight(flight.folder, console)
         else:
             offer_page(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")

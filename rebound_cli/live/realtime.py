@@ -149,7 +149,6 @@ class Loop:
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
     heir: Heir | None = None  # once there is a vehicle to be told something
-    step: Callable[[bytes, int], StepResult] | None = None  # where somebody follows the steps of what is stepped
 
     def run(self, beside: Callable[[int, StepResult], None], is_over: Callable[[], bool] = lambda: False) -> None:
         """After the first interrupt it finishes by itself. `beside` is what happens besides with each step.
@@ -207,7 +206,7 @@ class Loop:
         return received
 
     def _step(self, received: bytes, now_us: int) -> StepResult:
-        result = (self.step or self.stepped.step)(received, now_us)
+        result = self.stepped.step(received, now_us)
         self.now_us = now_us
         try:
             for frame in result.sent_frames:

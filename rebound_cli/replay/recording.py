@@ -12,14 +12,13 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from companion.companion import Companion, StepResult
+from companion.companion import Companion
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import Asked, ComputerStatus
 from companion.mission.model import Mission
-from companion.reflex.detection.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
 from rebound_cli.inputs.documents import load_document, validated
 from rebound_cli.inputs.inputs import mission_from
@@ -128,46 +127,28 @@ def _steps(tlog: Path) -> dict[int, RecordedStep]:
     return steps
 
 
-class Followed:
-    """What a companion's monitor finds, noted step by step: of a simulated flight, and of one that is flown again."""
-
-    def __init__(self) -> None:
-        self.findings = Findings()
-        self.started_at_us = self.ended_at_us = 0
-        self._watch: CollisionMonitor | None = None
-
-    def step(self, stepped: Companion | Guard, received: bytes, now_us: int) -> StepResult:
-        """The companion's own."""
-        # What the flight knew when the packets came; they may move it on.
-        known = stepped.core.situation()
-        result = stepped.step(received, now_us)
-        monitor = stepped.core.reflex.monitor
-        if monitor is not self._watch:
-            self.findings.listener.listen(monitor)
-        self._watch = monitor
-        for event in result.events:
-            self.findings.happenings.append((event.time_us, event.text))
-        # A step in which nothing came or went is in no recording.
-        if received or result.sent_frames:
-            self.findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, now_us)
-            self.started_at_us, self.ended_at_us = self.started_at_us or now_us, now_us
-        return result
-
-    def close(self) -> None:
-        self.findings.close(self.ended_at_us)
-
-
 def reproduce(recording: Recording) -> tuple[Findings, str | None]:
     """Fly the recording to its end, whatever differs; None when every packet sent and every event is the same to the
     bit, else the first difference.
     """
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
-    followed, expected, differences = Followed(), list(recording.event_lines), []
+    findings, expected, differences = Findings(), list(recording.event_lines), []
     told: list[str] = []
+    watch, ended_us = None, 0
     for step in recording.steps:
-        result = followed.step(stepped, b"".join(step.received), step.time_us)
+        # What the flight knew when the packets came; they may move it on.
+        known = stepped.core.situation()
+        result = stepped.step(b"".join(step.received), step.time_us)
+        monitor = stepped.core.reflex.monitor
+        if monitor is not watch:
+            findings.listener.listen(monitor)
+        watch = monitor
+        if step.received or result.sent_frames:
+            ended_us = step.time_us
+            findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, ended_us)
         for event in result.events:
+            findings.happenings.append((event.time_us, event.text))
             then = expected[len(told)] if len(told) < len(expected) else None
             told.append(run_folder.event_line(event))
             if then is None:
@@ -182,8 +163,8 @@ def reproduce(recording: Recording) -> tuple[Findings, str | None]:
             with run_folder.reading(run_folder.INPUTS_NAME):
                 _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
-    followed.close()
-    return followed.findings, differences[0] if differences else None
+    findings.close(ended_us)
+    return findings, differences[0] if differences else None
 
 
 def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:

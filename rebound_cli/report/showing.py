@@ -9,26 +9,20 @@ from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
 from threading import Thread
-from typing import TYPE_CHECKING
 
 from companion.errors import ReboundError
 from rebound_cli.live.console import Console
 from rebound_cli.results.run_folder import REPORT_NAME, TLOG_NAME
 
-if TYPE_CHECKING:
-    from rebound_cli.replay.recording import Followed
 
-
-def show_flight(folder: Path, followed: "Followed", console: Console) -> None:
-    """Write its page, which decides nothing again; Ctrl-C leaves it out. Raises OSError."""
+def show_flight(folder: Path, console: Console) -> None:
+    """Write its page; Ctrl-C leaves it out. Raises OSError."""
     try:
         # A drone that only offers the page never loads what makes it.
         from rebound_cli.report.page import write_page
-        from rebound_cli.report.shown_flight import followed_flight, recorded_flight
+        from rebound_cli.report.shown_flight import recorded_flight
 
-        # Where nothing was heard, that is what reading it says.
-        flight = followed_flight(folder, followed) if followed.started_at_us else recorded_flight(folder)
-        write_page(flight, folder / REPORT_NAME)
+        write_page(recorded_flight(folder), folder / REPORT_NAME)
     except KeyboardInterrupt:
         offer_page(folder, console)
     except ReboundError as error:

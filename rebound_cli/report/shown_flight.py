@@ -14,7 +14,7 @@ from companion.memory.patch import Patch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.inputs.documents import load_document, validated
-from rebound_cli.replay.recording import Followed, Recording, read_recording, read_settings, reproduce, settings_file
+from rebound_cli.replay.recording import Recording, read_recording, read_settings, reproduce, settings_file
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings, sampled_as
 from rebound_cli.results import run_folder
@@ -100,18 +100,6 @@ def decided_again(folder: Path, recording: Recording, findings: Findings, differ
         log=read_flight_log(folder / run_folder.TLOG_NAME),
         versions=recording.versions,
         difference=difference,
-    )
-
-
-def followed_flight(folder: Path, followed: Followed) -> ShownFlight:
-    """The same of one that was followed while it was flown: nothing is decided again. Raises ReboundError."""
-    followed.close()
-    events = run_folder.read_text(folder / run_folder.EVENTS_NAME)
-    return replace(
-        _in_folder(folder, read_settings(folder), followed.findings, events),
-        started_at_us=followed.started_at_us,
-        log=read_flight_log(folder / run_folder.TLOG_NAME),
-        versions=run_folder.versions(),
     )
 
 

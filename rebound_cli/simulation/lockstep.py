@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from companion.companion import Companion
@@ -11,7 +10,6 @@ from companion.mission.model import Mission, itinerary
 from rebound_cli.live.console import Console
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.live.realtime import look_for_file
-from rebound_cli.replay.recording import Followed
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import Flown
 from rebound_cli.results.truth_match import FlightTruth
@@ -55,20 +53,18 @@ def fly_mission_lockstep(
     recorder: FlightRecorder,
     interrupts: Interrupts,
     console: Console | None = None,
-    followed: Followed | None = None,
 ) -> Flown:
     """Exchange bytes, an interval a step, until the companion has finished, its packets one interval later; it fails
-    when that takes much longer than it should. `followed` notes what is detected.
+    when that takes much longer than it should.
     """
     companion = Companion(mission)
-    step = companion.step if followed is None else partial(followed.step, companion)
     limit_s, started_s = virtual_time_limit_s(mission), time.monotonic()
     limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
     is_confirmed, pending, count = False, b"", 0
     while not companion.finished:
         frames = vehicle.step(pending)
         now_us = EPOCH_US + vehicle.time_boot_us
-        result = step(b"".join(frames), now_us)
+        result = companion.step(b"".join(frames), now_us)
         pending = b"".join(result.sent_frames)
         recorder.record(now_us, result)
         if result.events:

@@ -3,7 +3,6 @@
 import math
 import random
 import sys
-from functools import partial
 from typing import Any
 
 from bench.fly.air import Air, Injector
@@ -56,9 +55,9 @@ class World(Air):
         return [] if self.cut_until_s else frames
 
 
-def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, mission_file=SQUARE):
+def fly(folder, stream=sys.stderr, confirm=None, computer=None):
     """A hop in virtual time through the loop of real flights."""
-    document = load_mission_document(mission_file, HOP_SETS if mission_file == SQUARE else ())
+    document = load_mission_document(SQUARE, HOP_SETS)
     scene = world_from(document)
     mission = mission_from(document, scene)
     companion = Companion(mission)
@@ -70,7 +69,6 @@ def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, m
     problem = None
     try:
         loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
-        loop.step = None if followed is None else partial(followed.step, companion)
         fly_realtime(companion, loop, confirm_now if confirm is None else confirm(world))
     except FlightFaultError as error:
         problem = str(error)

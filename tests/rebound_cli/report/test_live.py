@@ -20,7 +20,6 @@ from companion.errors import ReboundError
 from companion.messages import Attitude, LocalPosition
 from companion.mission.config import CompanionConfig
 from rebound_cli.live.console import Console
-from rebound_cli.replay.recording import Followed
 from rebound_cli.replay.report import replay_log, report_text
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report import showing
@@ -28,11 +27,9 @@ from rebound_cli.report.content import content
 from rebound_cli.report.live_server import WatchServer
 from rebound_cli.report.moments import moments_of
 from rebound_cli.report.page import page
-from rebound_cli.report.shown_flight import followed_flight, recorded_flight, replayed_flight
+from rebound_cli.report.shown_flight import replayed_flight
 from rebound_cli.report.tail import COLUMNS, Tail
 from rebound_cli.results.flight_log import read_flight_log
-from tests.rebound_cli.command import WALL
-from tests.rebound_cli.live.flying import fly
 from tests.rebound_cli.replay.flying import HIT_US, flight
 from tests.rebound_cli.report.test_page import Opened
 from tests.test_structure import alone
@@ -180,14 +177,8 @@ def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
     assert wall.findings.listener.shown.keys() == fired
 
 
-def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_folder, tmp_path):
-    # In lockstep
+def test_a_simulated_flight_has_its_page(wall, wall_folder):
     assert (wall_folder / "report.html").read_text() == page(wall)
-    # and by the loop of real flights
-    followed = Followed()
-    fly(tmp_path, followed=followed, mission_file=WALL)
-    shown = replace(followed_flight(tmp_path, followed), versions={})
-    assert followed.findings.collisions and page(shown) == page(recorded_flight(tmp_path))
 
 
 def of_a_log(log):
