@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from rebound_cli.compare.rows import Row, lines_of, notes
+from rebound_cli.compare.rows import NOTE, Row, lines_of
 
 CHARTS = {
     "at_rest_after_s": "at rest after the hit [s]",
@@ -30,8 +30,7 @@ td {{ padding: 0.2rem 0.8rem }} tr:nth-child(even) {{ background: #eee }} svg {{
 def write_page(path: Path, title: str, rows: Sequence[Row]) -> None:
     cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in line) for line in lines_of(rows))
     table = "".join(f"<tr>{line}</tr>" for line in cells)
-    note = " ".join(notes(rows))
-    page = _PAGE.format(title=html.escape(title), charts=_charts(rows), table=table, note=note)
+    page = _PAGE.format(title=html.escape(title), charts=_charts(rows), table=table, note=NOTE)
     path.write_text(page, encoding="utf-8")
 
 

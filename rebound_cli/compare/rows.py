@@ -13,8 +13,6 @@ from rebound_cli.compare.cases import Case
 from rebound_cli.results.run_folder import REPORT_NAME
 
 NOTE = "Medians, and in brackets the worst: the fastest, the latest, the most, the nearest."
-# A hit at nine tenths of the speed that was asked for is one at that speed.
-_REACHED_SHARE = 0.9
 _HEADING = ("", "completed", "hit [m/s]", "at rest [s]", "height lost [m]", "second touches", "stopped off it [m]")
 
 
@@ -72,20 +70,8 @@ def _told(values: Sequence[float | None], worst: Callable[[Sequence[float]], flo
     return f"{statistics.median(known):.2f} ({worst(known):.2f})" if known else "-"
 
 
-def notes(rows: Sequence[Row]) -> list[str]:
-    """What the table means, and at which speeds nothing was hit, though it was at lower ones."""
-    hits = [(row.speed_m_s, row.impact_speed_m_s) for row in rows if row.speed_m_s and row.impact_speed_m_s]
-    reached = {asked for asked, hit in hits if hit >= _REACHED_SHARE * asked}
-    missed = sorted({asked for asked, _ in hits} - reached)
-    if not missed:
-        return [NOTE]
-    most_m_s = max(hit for asked, hit in hits if asked in missed)
-    speeds = ", ".join(f"{asked:g}" for asked in missed)
-    return [NOTE, f"Not reached before the hit: {speeds} m/s, but {most_m_s:.2f}. Begin further away from it."]
-
-
 def table(rows: Sequence[Row]) -> str:
     """For a terminal."""
     lines = lines_of(rows)
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join([*("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines), *notes(rows)])
+    return "\n".join([*("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines), NOTE])

@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 from companion.mission.config import CompanionConfig
 from companion.shell.files import write_whole
 from rebound_cli.flights.kept import hits_in, hits_text
-from rebound_cli.inputs.documents import parse_document, refuse_existing, refuse_special, validated
+from rebound_cli.inputs.documents import refuse_existing, refuse_special
 from rebound_cli.inputs.inputs import companion_settings
 from rebound_cli.logs.log import Log, LogError, clipping_text
 from rebound_cli.logs.reader import read_log
@@ -67,9 +67,6 @@ def run_tune(options: Namespace) -> None:
     found = margins(logs, config)
     settings, reasons, left = advise(logs, config, found)
     text = settings_text(settings, reasons, ", ".join(path.name for path in options.logs))
-    # Read as `rebound fly` will read it before anybody has it.
-    document = parse_document(text, str(out or "the settings"))
-    validated(CompanionConfig, document, document.data["companion"], ("companion",))
     if left:
         alarms = f"{left} false alarm{'s' if left > 1 else ''}"
         print(f"With these settings still {alarms}: this vehicle is not made quiet by thresholds.\n")

@@ -12,7 +12,7 @@ from distributed import LocalCluster
 from rebound_cli.arguments import speeds_m_s
 from rebound_cli.compare.cases import Case
 from rebound_cli.compare.command import _flown
-from rebound_cli.compare.rows import lines_of, notes, row_of
+from rebound_cli.compare.rows import lines_of, row_of
 from rebound_cli.main import main
 from tests.rebound_cli.command import assert_one_clear_sentence, run_here
 
@@ -87,14 +87,6 @@ def hit(speed_m_s, rest_s):
 def row(asked_m_s, collision, outcome="completed", recontacts=0):
     summary = {"outcome": outcome, "reason": "", "recontacts": recontacts, "collisions": [collision]}
     return row_of(Case("paper", asked_m_s, 1, ()), summary)
-
-
-def test_a_speed_that_the_way_to_the_wall_was_too_short_for_is_told():
-    # Given hits at the 2 m/s that were asked for, and at 2.8 and 2.7 where 4 were
-    rows = [row(2.0, hit(1.95, 1.0)), row(4.0, hit(2.8, 1.0)), row(4.0, hit(2.7, 1.0))]
-    # Then the second speed is told as what it was
-    assert notes(rows)[1:] == ["Not reached before the hit: 4 m/s, but 2.80. Begin further away from it."]
-    assert len(notes(rows[:1])) == 1
 
 
 def test_the_table_has_medians_of_what_is_known_and_the_worst():
