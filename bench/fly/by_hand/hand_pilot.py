@@ -1,13 +1,12 @@
 """A pilot who flies hard by sticks: takes off, strokes, and back before it is too far or low."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from bench.fly.by_hand.watched import STICKS_S, GuardedFlight, Sticks
-from companion.guard.guard import Guard
 from companion.motion.config import GRAVITY_M_S2
 from sim_vehicle.airframe import Airframe
 
@@ -34,9 +33,8 @@ class Pilot:
         parameters: dict[str, float],
         wished: Iterator[Sticks],
         mode: str,
-        guards: Sequence[Guard],
     ) -> None:
-        self._flight, self._wished, self._mode, self._guards = flight, wished, mode, guards
+        self._flight, self._wished, self._mode = flight, wished, mode
         self._body = flight.vehicle.state.body
         self._hover, self._climb_m_s = airframe.hover_fraction, airframe.control.climb_max_m_s
         self._speed_m_s = parameters["MPC_VEL_MANUAL"]
@@ -68,8 +66,8 @@ class Pilot:
             flight.looks_for_ground = True
         if self._next == self._vigorous:
             self._tilts_deg.append(flight.tilt_deg)
-        for guard in self._guards:
-            guard.core.flight.program_elsewhere = True  # a hit is reported, and nobody takes the vehicle over
+        for watcher in flight.watchers:
+            watcher.guard.core.flight.program_elsewhere = True  # a hit is reported, and nobody takes the vehicle over
         return self._next()
 
     def _idle(self) -> Sticks:

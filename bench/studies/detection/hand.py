@@ -113,7 +113,7 @@ def fly_by_hand(case: HandCase) -> Row:
     vehicle = SimulatedVehicle(airframe, scene, case.seed, keeps_path=False, parameters=parameters)
     guards = [_guard({**built.settings, "streams": {"highres_imu_hz": float(hz)}}) for hz in IMU_HZ]
     flight = GuardedFlight(vehicle, *guards)
-    tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode, guards).fly()
+    tilts = Pilot(flight, airframe, parameters, wishes(rng), case.mode).fly()
     return {
         "seed": case.seed,
         "airframe": airframe.name,
