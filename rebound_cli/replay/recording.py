@@ -5,14 +5,14 @@ whole companion once more.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from companion.companion import Companion
+from companion.companion import Companion, StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
@@ -133,9 +133,7 @@ def reproduce(recording: Recording) -> tuple[Findings, str | None]:
     """
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
-    findings, expected, differences = Findings(), list(recording.event_lines), []
-    told: list[str] = []
-    watch, ended_us = None, 0
+    findings, watch, differences, told = Findings(), None, list[str](), list[str]()
     for step in recording.steps:
         # What the flight knew when the packets came; they may move it on.
         known = stepped.core.situation()
@@ -144,27 +142,30 @@ def reproduce(recording: Recording) -> tuple[Findings, str | None]:
         if monitor is not watch:
             findings.listener.listen(monitor)
         watch = monitor
-        if step.received or result.sent_frames:
-            ended_us = step.time_us
-            findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, ended_us)
-        for event in result.events:
-            findings.happenings.append((event.time_us, event.text))
-            then = expected[len(told)] if len(told) < len(expected) else None
-            told.append(run_folder.event_line(event))
-            if then is None:
-                differences.append(f"this event is new: {told[-1].strip()}")
-            elif told[-1] != then:
-                differences.append(f"event {len(told)} was {then.strip()} and is {told[-1].strip()}")
-        if list(step.sent) != list(result.sent_frames):
-            were, are = len(step.sent), len(result.sent_frames)
-            what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
-            differences.append(f"at {step.time_us} us {what}")
+        findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, step.time_us)
+        findings.happenings += ((event.time_us, event.text) for event in result.events)
+        differences += _differences(recording.event_lines, step, result, told)
         for record in step.told:
             with run_folder.reading(run_folder.INPUTS_NAME):
                 _tell(stepped, record)
-    differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
-    findings.close(ended_us)
+    differences += [f"this event did not come again: {line.strip()}" for line in recording.event_lines[len(told) :]]
+    findings.close(step.time_us)
     return findings, differences[0] if differences else None
+
+
+def _differences(expected: Sequence[str], step: RecordedStep, result: StepResult, told: list[str]) -> Iterator[str]:
+    """Of a step; its events are added to those `told` so far."""
+    for line in map(run_folder.event_line, result.events):
+        then = expected[len(told)] if len(told) < len(expected) else None
+        told.append(line)
+        if then is None:
+            yield f"this event is new: {line.strip()}"
+        elif line != then:
+            yield f"event {len(told)} was {then.strip()} and is {line.strip()}"
+    if list(step.sent) != list(result.sent_frames):
+        were, are = len(step.sent), len(result.sent_frames)
+        what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
+        yield f"at {step.time_us} us {what}"
 
 
 def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
