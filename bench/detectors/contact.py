@@ -64,7 +64,9 @@ class Baseline(ABC):
             reading = self.look(state, sample, situation)
             if reading is not None:
                 impact = judge(state, sample.time_boot_us, reading, situation.off_reason)
-                return None if impact is None else _on_ground(impact, situation, motion)
+                # It does not classify, but for a landing: the ground is no hit.
+                named = None if impact is None else classified(impact, None, situation, motion)
+                return named if named is not None and named.kind is ImpactKind.LANDING else impact
         return None
 
     @abstractmethod
@@ -74,12 +76,6 @@ class Baseline(ABC):
     def free_until_us(self, s: DetectorState, now_us: int) -> int:
         """Before the sample's averaging window, or the gap before it."""
         return min(now_us - self._averaging_us, s.last_sample_boot_us)
-
-
-def _on_ground(impact: Impact, situation: Situation, motion: Motion) -> Impact:
-    """A baseline does not classify, but for a landing: the ground is no hit."""
-    named = classified(impact, None, situation, motion)
-    return named if named.kind is ImpactKind.LANDING else impact
 
 
 def judge(state: DetectorState, time_us: int, reading: Reading, off_reason: str | None) -> Impact | None:

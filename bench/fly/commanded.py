@@ -45,7 +45,7 @@ class Commanded(VirtualTime):
         self.is_late = False  # the guard: what comes waits in its socket
         self._unread: list[bytes] = []
         self._repeated: list[Callable[[], None]] = []
-        self.every(1.0, self._beat)
+        self.every(1.0, lambda: self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)))
 
     @property
     def now_us(self) -> int:
@@ -63,9 +63,6 @@ class Commanded(VirtualTime):
     @abstractmethod
     def send(self, message: Any) -> None:
         """The other's message goes with the next step."""
-
-    def _beat(self) -> None:
-        self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
 
     def command(self, number: int, *params: float) -> None:
         unset = math.nan if number == TAKEOFF else 0.0

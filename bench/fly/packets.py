@@ -43,11 +43,6 @@ def changed(frame: bytes, change: Callable[[Any], None]) -> bytes:
     if message is None:
         return frame
     change(message)
-    return packed_by(message)
-
-
-def packed_by(message: Any) -> bytes:
-    """The message as its own sender would send it, of the same number."""
     link = dialect.MAVLink(None, message.get_srcSystem(), message.get_srcComponent())
     link.seq = message.get_seq()
     packed: bytes = message.pack(link)

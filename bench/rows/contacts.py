@@ -178,10 +178,12 @@ def contacts_of(flight: JudgedFlight) -> list[JudgedContact]:
     for hit in flight.truth.hits:
         phase = phases.at(hit.contact_at_boot_us)
         is_landing = phase in (MissionPhase.LANDING, MissionPhase.OVER, MissionPhase.GROUND)
-        collision = None if is_landing else _seen_as(hit, flight.report.collisions)
+        seen = (number for number, told in enumerate(flight.report.collisions) if _covers(hit, told))
+        collision = None if is_landing else next(seen, None)
+        is_bounce = bool(episode) and hit.contact_at_boot_us - episode[-1].ended_at_boot_us <= FOLLOWS_WITHIN_US
         if is_landing:
             role = Role.LANDING
-        elif not episode or (phase is not MissionPhase.RECOVERING and not _follows(hit, episode[-1])):
+        elif not episode or not (phase is MissionPhase.RECOVERING or is_bounce):
             role, episode = Role.HIT, [hit]
         else:
             role = Role.AGAIN if any(same_surface(hit, earlier) for earlier in episode) else Role.NEXT
@@ -190,17 +192,9 @@ def contacts_of(flight: JudgedFlight) -> list[JudgedContact]:
     return found
 
 
-def _follows(hit: Hit, earlier: Hit) -> bool:
-    return hit.contact_at_boot_us - earlier.ended_at_boot_us <= FOLLOWS_WITHIN_US
-
-
 def same_surface(hit: Hit, other: Hit) -> bool:
     facing = sum(a * b for a, b in zip(hit.normal_ned, other.normal_ned, strict=True))
     return hit.obstacle == other.obstacle and facing > SAME_SURFACE
-
-
-def _seen_as(hit: Hit, collisions: Sequence[CollisionReport]) -> int | None:
-    return next((n for n, collision in enumerate(collisions) if _covers(hit, collision)), None)
 
 
 def _covers(hit: Hit, collision: CollisionReport) -> bool:

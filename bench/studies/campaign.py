@@ -110,11 +110,6 @@ def run_only(case: MissionCase, out: Path | None) -> int:
 # --- what must be shown
 
 
-def noticeable(hits: pd.DataFrame) -> "pd.Series[bool]":
-    """Those that go into the surface, not along it, as fast as a detector must notice."""
-    return hits["closing_m_s"] >= NOTICED_M_S
-
-
 def level(hits: pd.DataFrame) -> pd.DataFrame:
     """Answered hits on something upright in level flight that met nothing else: their height is the hit's doing."""
     is_level = (hits["climbing_m_s"].abs() < LEVEL_M_S) & (hits["steepness"].abs() < UPRIGHT) & (hits["others"] == 0)
@@ -140,5 +135,6 @@ def _hits(airframe: str, hits: pd.DataFrame) -> Iterator[Bar]:
     yield share_bar(what, is_near & (answered["returned"] == 0))
     lost_m = level(hits[hits["speed_m_s"] < LOST_UP_TO_M_S])["lost_m"]
     yield share_bar(f"{airframe}, level, up to 2.5 m/s: at most 10 cm of height lost", lost_m <= LOST_MOST_M, 1.0)
-    into = hits[noticeable(hits)]
+    # Those that go into the surface, not along it, as fast as a detector must notice.
+    into = hits[hits["closing_m_s"] >= NOTICED_M_S]
     yield share_bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", into["seen"])

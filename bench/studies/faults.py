@@ -171,16 +171,13 @@ def shown(results: Results) -> Shown:
     rows = pd.DataFrame(results.rows()).sort_values("fault", key=lambda names: names.map(order), kind="stable")
     failing = list(rows[rows["complaints"].map(bool)]["fault"].unique())
     lead = f"{rows['fault'].nunique()} faults, {len(rows)} flights; {len(failing)} rows not as expected."
-    parts = {"": f"{lead}\n\n{faults_table(rows)}", "What was not as expected": complaints(rows)}
+    told = table([_of_fault(str(name), flights) for name, flights in rows.groupby("fault", sort=False)])
+    parts = {"": f"{lead}\n\n{told}", "What was not as expected": complaints(rows)}
     return Shown(parts, f"{lead} {', '.join(failing)}", rows, is_met=not failing)
 
 
-def faults_table(rows: pd.DataFrame) -> str:
-    """A row a fault: what is injected, expected and happened, the worst of it, and the verdict."""
-    return table([_of_fault(str(name), flights) for name, flights in rows.groupby("fault", sort=False)])
-
-
 def _of_fault(name: str, flights: pd.DataFrame) -> dict[str, object]:
+    """What is injected, expected and happened, the worst of it, and the verdict."""
     bad = int(flights["complaints"].map(bool).sum())
     hits = flights[flights["hit"]]
     ends = flights["outcome"].map(ENDS).value_counts(sort=False)

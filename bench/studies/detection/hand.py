@@ -49,7 +49,8 @@ def run_hand(options: Namespace) -> int:
 
 def shown(results: Results) -> Shown:
     rows = results.rows()
-    watched = by_rate(rows)
+    # A row for each of the guards of each flight.
+    watched = [{**row, **guarded} for row in rows for guarded in row["watched"]]
     text = text_of(watched)
     return Shown({"": text}, text, pd.DataFrame(rows), is_met=not any(map(_in_the_air, watched)))
 
@@ -73,10 +74,6 @@ def _gusts(rng: np.random.Generator) -> Faults:
     return faults
 
 
-def _turbulence(rng: np.random.Generator) -> Faults:
-    return [{"kind": "turbulence", "wind_20ft_m_s": float(rng.uniform(4.0, 12.0)), "at_s": 0.0}]
-
-
 def _vibration(rng: np.random.Generator) -> Faults:
     """From a good vehicle's to a bent propeller's, which reaches the sensor's range again and again.
 
@@ -95,7 +92,7 @@ def _vibration(rng: np.random.Generator) -> Faults:
 AIR: dict[str, Callable[[np.random.Generator], Faults]] = {
     "calm": lambda rng: [],
     "gusts": _gusts,
-    "turbulence": _turbulence,
+    "turbulence": lambda rng: [{"kind": "turbulence", "wind_20ft_m_s": float(rng.uniform(4.0, 12.0)), "at_s": 0.0}],
     "vibration": _vibration,
 }
 
@@ -161,11 +158,6 @@ def agile(airframe: Airframe, rng: np.random.Generator) -> tuple[Airframe, dict[
 
 
 # --- the table
-
-
-def by_rate(rows: Sequence[Row]) -> list[Row]:
-    """A row for each of the guards of each flight."""
-    return [{**row, **watched} for row in rows for watched in row["watched"]]
 
 
 def text_of(rows: Sequence[Row]) -> str:

@@ -132,6 +132,9 @@ def parts(hits: pd.DataFrame) -> dict[str, str]:
     }
     groups[f"all, from {NOTICED_M_S:g} m/s on"] = noticed
     cells = {name: cell(some) for name, some in groups.items()}
+    # Each with what was met.
+    missed = noticed[~noticed["found"]][["seed", "approach"]].head(NAMED_SEEDS)
+    named = [f"{seed}/{met}" for seed, met in missed.to_numpy().tolist()]
     # Nothing of the kind was flown in the cell: nothing is shown of it.
     open_cells = [name for name, figures in cells.items() if float(str(figures["at most [%]"])) >= 100 * BOUND]
     by_cell = table([{"hits of": name} | figures for name, figures in cells.items()])
@@ -139,7 +142,7 @@ def parts(hits: pd.DataFrame) -> dict[str, str]:
         "By airframe, rate and speed": f"{by_cell}\nNot shown, at {100 * CONFIDENCE:g} %, to be missed in fewer than "
         f"{100 * BOUND:g} %: {'; '.join(open_cells) or 'none'}.\n",
         "By what was met": table([{"met": met} | cell(some) for met, some in noticed.groupby("approach")]),
-        "Missed at 0.5 m/s and more": _seeds(noticed[~noticed["found"]]) + "\n",
+        "Missed at 0.5 m/s and more": f"{', '.join(named) or 'none'}\n",
     }
 
 
@@ -164,9 +167,3 @@ def cell(hits: pd.DataFrame) -> dict[str, object]:
         "lost, 95 % [m]": text_of(hits["lost_m"].quantile(0.95), 2),
         "at rest after, median [s]": text_of(found["rest_s"].quantile(0.5), 2),
     }
-
-
-def _seeds(hits: pd.DataFrame) -> str:
-    """Each with what was met."""
-    named = [f"{seed}/{met}" for seed, met in hits[["seed", "approach"]].head(NAMED_SEEDS).to_numpy().tolist()]
-    return ", ".join(named) + (", ..." if len(hits) > NAMED_SEEDS else "") or "none"

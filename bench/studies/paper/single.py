@@ -11,7 +11,7 @@ from bench.cases.vehicles import AIRFRAMES
 from bench.cases.walls import approach
 from bench.rows.paper import BREAKING_FORCE_N, Floats, StudyFlight
 from bench.rows.tables import table
-from bench.studies.paper.figures import CONTACT, add_legend, draw_flight, finish, mark_paper, new_figure
+from bench.studies.paper.figures import CONTACT, finish, mark_paper, new_figure
 from bench.studies.paper.study import Findings, Study, claim
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.control.setpoint import TrajectorySetpoint
@@ -154,7 +154,7 @@ def hover_share(mass_kg: float) -> float:
 def _flights() -> list[StudyFlight]:
     off = {"lateral": {"threshold_m_s2": NEVER_M_S2}}
     missions = approach(BOUNCING_M_S, companion=off), approach(BOUNCING_M_S)
-    return [StudyFlight({}, mission, "foldable", 1, is_drawn=True) for mission in missions]
+    return [StudyFlight({}, mission, "foldable", 1) for mission in missions]
 
 
 def _conclude(flights: pd.DataFrame) -> Findings:
@@ -189,15 +189,7 @@ def _conclude(flights: pd.DataFrame) -> Findings:
         }
         for (name, speed_m_s), each in pulses.items()
     ]
-    return Findings(rows, {"bouncing.png": _figure(flights)}, {"Single head-on hits, motors off": table(lines)})
-
-
-def _figure(flights: pd.DataFrame) -> Figure:
-    figure, axes = new_figure(2, 2, "The same wall at 1 m/s without and with recovery (foldable)")
-    for column, (track, title) in enumerate(zip(flights["track"], ("recovery off", "recovery on"), strict=True)):
-        draw_flight(axes[:, column], track, (title, ""))
-    add_legend(figure)
-    return figure
+    return Findings(rows, tables={"Single head-on hits, motors off": table(lines)})
 
 
 OTHERS = Study("Other claims", _flights, _conclude)
