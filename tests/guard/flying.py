@@ -20,10 +20,7 @@ from companion.guard.guard import AttachedGuard, Guard
 from companion.guard.states import State
 from companion.mavlink.named import named, packet_from
 from companion.report import Event
-from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
-from sim_vehicle.scene import Scene
-from sim_vehicle.vehicle import SimulatedVehicle
 from tests.flying import Told
 
 VELOCITY_ONLY = 0xDC7
@@ -35,27 +32,7 @@ class Watched(Told, Commanded):
 
     def __init__(self, *arguments: Any, **scene: Any) -> None:
         self.on_wire: list[tuple[float, str, Any]] = []
-        self._earlier_us = 0
         super().__init__(*arguments, **scene)
-
-    @property
-    def time_s(self) -> float:
-        return 1e-6 * (self._earlier_us + self.vehicle.time_boot_us)
-
-    @property
-    def now_us(self) -> int:
-        return EPOCH_US + self._earlier_us + self.vehicle.time_boot_us
-
-    def restart_vehicle(self) -> None:
-        """On the ground: its clock begins anew, and while it boots nothing is heard of it."""
-        before, self._earlier_us = self.vehicle, self._earlier_us + self.vehicle.time_boot_us
-        boots = {"kind": "wire", "between_s": (0.0, 2.0), "loss": 1.0}
-        self.vehicle = SimulatedVehicle(load_built_in("foldable"), Scene.model_validate({"faults": [boots]}), 1)
-        self.vehicle.put(before.obstacles)
-        self.join_links()
-
-    def join_links(self) -> None:
-        """Where the vehicle has not one for a lone companion."""
 
     def passes(self, sender: str, packet: bytes) -> None:
         self.on_wire.append((self.time_s, sender, decoded(packet)))
@@ -105,15 +82,12 @@ class GuardedFlight(Watched):
     ) -> None:
         super().__init__("foldable", parameters, **scene)
         self.guard = Guard(config or GuardConfig())
-        self.join_links()
+        self._guards_link = self.vehicle.add_link(LinkKind.ONBOARD)
+        self._others_link = self.vehicle.add_link(LinkKind.NORMAL)
         self._guards: list[bytes] = []
         self._others: list[bytes] = []
         self.others_last: dict[str, Any] = {}
         self.forward = 0.0
-
-    def join_links(self) -> None:
-        self._guards_link = self.vehicle.add_link(LinkKind.ONBOARD)
-        self._others_link = self.vehicle.add_link(LinkKind.NORMAL)
 
     def send(self, message: Any) -> None:
         self._others.append(message.pack(dialect.MAVLink(None, *GROUND_STATION)))

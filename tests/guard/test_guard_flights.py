@@ -9,16 +9,18 @@ from pymavlink.dialects.v20 import development as dialect
 from bench.fly.commanded import FACE_NORTH_M, LAND, MANUAL_POSITION, OFFBOARD, fly_a_mission
 from bench.fly.packets import made
 from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
 from companion.guard.states import State
 from companion.guard.watching import observe
 from companion.link.streams import StreamMonitor
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from companion.reflex.detection.detector import Phase
-from tests.guard.flying import AttachedFlight
+from tests.companion.fake_vehicle import FakeVehicle
+from tests.flying import Flight
 from tests.guard.flying import GuardedFlight as Air
 
-CLEAR_M = 0.3
+CLEAR_M, STREAM = 0.3, 511
 
 
 def recovering(**changes) -> Air:
@@ -349,28 +351,23 @@ def test_a_guard_on_the_ground_does_not_go_in_while_the_link_is_slow():
 # --- a vehicle that is restarted on the ground
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [Air, AttachedFlight])
-def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_and_guarded(kind):
+def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again():
     # Given a guard that stands by; the last thing it saw was a contact, in which the vehicle lost its power
-    air = kind()
-    air.run_to(State.STANDING_BY, 10.0)
-    monitor = air.guard.core.reflex.monitor
-    monitor.state = replace(monitor.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
-    known_s, air.guard.core.reflex.loss_s = air.guard.core.reflex.loss_s, 99.0
-    # When the vehicle is restarted, and sends what it sends by default
-    air.restart_vehicle()
-    air.run_to(State.CONNECTING, 8.0)
-    assert air.told("link") == ["the vehicle was silent: its streams are asked for again"]
+    f = Flight(Guard(GuardConfig()), FakeVehicle())
+    f.run_to("standing by", 10.0)
+    asked, reflex = dict(f.vehicle.counts), f.companion.core.reflex
+    reflex.monitor.state = replace(reflex.monitor.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
+    known_s, reflex.loss_s = reflex.loss_s, 99.0
+    # When the vehicle is restarted, and its clock begins anew
+    f.vehicle.silent = True
+    f.run_for(2.0)
+    f.vehicle.silent, f.vehicle.time_us = False, 0
+    f.run_to("connecting", 8.0)
+    assert f.told("link") == ["the vehicle was silent: its streams are asked for again"]
     # Then it is asked again, and its detector begins anew
-    air.run_to(State.STANDING_BY, 30.0)
-    rates = [event.data for event in air.events if event.kind == "streams"]
-    assert len(rates) == 2 and rates[1]["HIGHRES_IMU"] == pytest.approx(250, abs=10)
-    assert air.guard.core.reflex.monitor.state.phase is not Phase.CONTACT
-    assert air.guard.core.reflex.loss_s == known_s
-    if kind is AttachedFlight:
-        # And the next flight's hit is answered: this ends when the guard holds
-        air.fly_into_the_wall()
+    f.run_to("standing by", 30.0)
+    assert f.kinds().count("streams") == 2 and f.vehicle.counts[STREAM] == 2 * asked[STREAM]
+    assert reflex.monitor.state.last_loud_boot_us == 0 and reflex.loss_s == known_s
 
 
 def test_a_guard_that_waits_begins_where_nobody_is_or_a_vehicle_that_tells_too_little():

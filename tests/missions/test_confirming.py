@@ -3,13 +3,11 @@
 import functools
 import math
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
 from bench.fly.copies import in_a_copy
-from bench.fly.packets import changed, made, number_of
-from companion.mavlink.packet import message_id_of
+from bench.fly.packets import made
 from tests.flying import Flight
 from tests.simulated import simulated
 
@@ -17,7 +15,6 @@ pytestmark = pytest.mark.flight
 
 PATH = {"path": {"points_ned_m": [[2, 0, -1.5], [6, 0, -1.5]], "speed_m_s": 2.0}}
 ITEMS = [{"takeoff": {"height_m": 1.5}}, PATH, {"land": {}}]
-AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 
 
 def imu(air: Flight, force_m_s2: float, rate_rad_s: float = 0.0) -> bytes:
@@ -45,17 +42,6 @@ def odometry(air: Flight, *jump: float) -> bytes:
     """With the reset counter of a vehicle that has never reset its estimate."""
     frames = {"time_usec": air.vehicle.time_boot_us + 2000, "frame_id": 1, "child_frame_id": 1, "q": [1, 0, 0, 0]}
     return made("ODOMETRY", frames | moved(air, *jump))
-
-
-def spoil(air: Flight, kind: str, change: Callable[[Any], None], seconds: float) -> None:
-    """Let the vehicle say otherwise for a while, in its messages of this kind."""
-    step, until_us, number = air.vehicle.step, air.vehicle.time_boot_us + round(seconds * 1e6), number_of(kind)
-
-    def spoilt(frame: bytes) -> bytes:
-        is_meant = message_id_of(frame) == number and air.vehicle.time_boot_us < until_us
-        return changed(frame, change) if is_meant else frame
-
-    air.vehicle.step = lambda received: [spoilt(frame) for frame in step(received)]
 
 
 @functools.cache
@@ -149,42 +135,3 @@ def test_one_forged_rate_place_or_velocity_of_local_position_is_no_hit(forged, h
         assert_goes_on(air, unconfirmed=0)
 
     fly_on(forge, f"companion.streams.highres_imu_hz={hz}")
-
-
-def stuck() -> Callable[[Any], None]:
-    """All six at the values they first show."""
-    first: dict[str, float] = {}
-
-    def keep(message: Any) -> None:
-        for axis in AXES:
-            setattr(message, axis, first.setdefault(axis, getattr(message, axis)))
-
-    return keep
-
-
-def zero(message: Any) -> None:
-    for axis in AXES:
-        setattr(message, axis, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        (stuck(), "detector blind: IMU stuck at one value"),
-        (zero, "detector blind: HIGHRES_IMU not accepted: the accelerometer reads zero"),
-    ],
-    ids=["stuck", "zero"],
-)
-@pytest.mark.parametrize("north_m", [2.5, 5.2])
-def test_an_imu_that_measures_nothing_for_a_second_makes_the_detector_blind_and_is_no_hit(change, reason, north_m):
-    """In cruise, and where the vehicle brakes for its goal, which such a sensor does not show."""
-
-    def forge(air: Flight) -> None:
-        air.run_until(lambda: motion(air)[0] > north_m)
-        spoil(air, "HIGHRES_IMU", change, seconds=1.0)
-        air.run_for(2.0)
-        blind, sees = air.told("link")
-        assert blind.startswith(reason) and sees == "the detector sees again"
-        assert (air.report.collisions, air.report.unconfirmed) == ((), 0)
-
-    fly_on(forge)

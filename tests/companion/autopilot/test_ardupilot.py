@@ -30,6 +30,7 @@ from rebound_cli.live.console import Console
 from rebound_cli.preflight.command import show
 from tests.companion.autopilot.fake_copter import ARM, AUX_FUNCTION, COPTER_LAND, GUIDED, SET_MODE, TAKE_OFF, FakeCopter
 from tests.companion.fake_vehicle import INTO_WALL, LANDING, SQUARE_ITEMS, TAKEOFF, FakeVehicle, flight
+from tests.flying import Flight
 
 
 def commanded(f, number):
@@ -277,20 +278,16 @@ def test_what_cannot_be_flown_ends_the_flight_in_one_sentence(vehicle, words):
     assert report.outcome != "completed" and all(word in report.reason for word in words), report.reason
 
 
-def guarded(vehicle, until):
-    """The guard on a link with the vehicle, until its state or its end."""
-    guard, pending = Guard(GuardConfig()), b""
-    while not (guard.finished or until(guard)):
-        result = guard.step(vehicle.step(pending), EPOCH_US + vehicle.time_us)
-        pending = b"".join(result.sent_frames)
-        assert vehicle.time_us < 30e6
-    return guard
+def guarded(vehicle):
+    """A guard that stands by, on a link with the vehicle."""
+    f = Flight(Guard(GuardConfig()), vehicle)
+    f.run_to("standing by", 30.0)
+    return f
 
 
 def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
     vehicle = FakeCopter()
-    guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
-    assert not guard.finished
+    guarded(vehicle)
     streams = {int(message.param1) for _, message in vehicle.commands if message.command == 511}
     assert {65, 85} <= streams and 69 not in streams
     assert {"LOITER", "AUTO", "POSHOLD", "GUIDED"} <= MODE_NAMES
@@ -301,7 +298,7 @@ def test_a_guard_meets_a_copter_and_hears_its_sticks_as_pulses():
 
 def test_a_switch_that_is_not_answered_is_set_again():
     vehicle = FakeCopter(ack=lambda command, count: [] if command == AUX_FUNCTION and count < 3 else [0])
-    guarded(vehicle, lambda guard: guard.status().state == "standing by" and vehicle.time_us > 4_000_000)
+    guarded(vehicle).run_for(2.0)
     switched = [message.confirmation for _, message in vehicle.commands if message.command == AUX_FUNCTION]
     assert switched == [0, 1, 2]
 
@@ -323,7 +320,7 @@ def test_a_radios_pulses_are_the_pilots_sticks():
 @pytest.mark.parametrize("asked", [(27, 1_000_000), (None, 0)])
 def test_a_board_without_highres_imu_is_asked_for_its_raw_one_and_a_client_that_slows_it_down_is_noticed(asked):
     vehicle = FakeCopter(ack=lambda command, count: [2] if command == 511 and count == 1 else [0])  # first the IMU's
-    guard = guarded(vehicle, lambda guard: guard.status().state == "standing by")
+    guard = guarded(vehicle).companion
     intervals_us = [(int(sent.param1), sent.param2) for _, sent in vehicle.commands if sent.command == 511]
     assert intervals_us[:2] == [(105, intervals_us[0][1]), (27, intervals_us[0][1])]
     guard.hear_interval(*asked)

@@ -154,10 +154,6 @@ def around(*patches: Patch, fence: Fence | None = None) -> ObstacleMap:
     return ObstacleMap(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
 
 
-def length_m(start, places) -> float:
-    return sum(math.dist(a, b) for a, b in pairwise([start, *places]))
-
-
 def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
     known = around(wall(0.2))
     assert known.block((START, GOAL))
@@ -167,7 +163,7 @@ def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
     # round the nearer end, which is the western one
     assert all(place[1] < 0.0 for place in places[:-1])
     least_m = math.hypot(4.0, 0.3 + CLEARANCE_M) + math.hypot(3.0, 0.3 + CLEARANCE_M)
-    assert least_m < length_m(START, places) < least_m + 0.3
+    assert least_m < sum(math.dist(a, b) for a, b in pairwise([START, *places])) < least_m + 0.3
 
 
 def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there_and_no_goal_is_reached_there():

@@ -29,7 +29,7 @@ from companion.reflex.reflex import Reflex
 
 STILL = (0.0, 0.0, 0.0)
 IN_FLIGHT = Situation(may_crash=True, height_m=3.0)
-# Noise by a hair's breadth: velocities that stand still to the last digit are no estimate.
+# Noise by a hair's breadth: what stands still to the last digit is no estimate, and no measurement.
 HAIR_M_S = 1e-3
 INTERVAL_US = 4_000
 
@@ -56,6 +56,7 @@ class Watch:
         place: Callable[[int], Vector3] = lambda t: STILL,
         rates: Callable[[int], Vector3] = lambda t: STILL,
         attitude: Callable[[int], Quaternion | None] = lambda t: LEVEL,
+        imu: Callable[[ImuSample], Sample] = lambda sample: sample,
         look: Callable[[int], None] = lambda t: None,
         situation: Situation = IN_FLIGHT,
         from_us: int = INTERVAL_US,
@@ -64,7 +65,7 @@ class Watch:
         """`push` is what moves it beside its thrust, body m/s^2; no attitude comes where there is none."""
         for t in range(from_us, until_us, every_us):
             x, y, z = push(t)
-            samples: list[Sample] = [ImuSample(t, (x, y, z - 9.80665), rates(t))]
+            samples: list[Sample] = [imu(ImuSample(t, (x, y, z - 9.80665), rates(t)))]
             if t % 32_000 == 0:
                 n, e, d = velocity(t)
                 told = (n + HAIR_M_S * (t // 32_000 % 2), e, d)
@@ -123,6 +124,37 @@ def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_
     # Then a velocity that no force explains is no hit, and it is told
     assert watch.impacts == []
     assert watch.texts("link") == ["detector blind: no ATTITUDE_QUATERNION for 250 ms", "the detector sees again"]
+
+
+@pytest.mark.parametrize(
+    ("imu", "reason"),
+    [
+        (lambda sample: ImuSample(sample.time_boot_us, (0.1, 0.0, -9.8), STILL), "IMU stuck at one value"),
+        (lambda sample: messages.Refused("HIGHRES_IMU", "it reads zero"), "HIGHRES_IMU not accepted: it reads zero"),
+    ],
+    ids=["stuck", "refused"],
+)
+def test_an_imu_that_measures_nothing_is_told_and_the_braking_that_it_does_not_show_is_no_hit(imu, reason):
+    # Given a vehicle that leans back for a second, and is slower by 1.5 m/s for it
+    def braked_s(t):
+        return 1e-6 * (min(max(t, 4_000_000), 5_000_000) - 4_000_000)
+
+    def half_rad(t):
+        return 0.075 * math.sin(math.pi * braked_s(t))
+
+    flown: dict[str, Any] = {
+        "push": lambda t: (HAIR_M_S * (t // INTERVAL_US % 2), 0.0, 0.0),
+        "velocity": lambda t: (2.0 - 1.5 * braked_s(t), 0.0, 0.0),
+        "attitude": lambda t: (math.cos(half_rad(t)), 0.0, math.sin(half_rad(t)), 0.0),
+    }
+    # When its IMU measures nothing of it until shortly before its end
+    watch = Watch().fly(4_000_000, **flown)
+    watch.fly(4_900_000, **flown, from_us=4_000_000, imu=imu)
+    watch.fly(8_000_000, **flown, from_us=4_900_000)
+    # Then the detector is blind until it has heard twenty samples
+    assert watch.impacts == []
+    assert watch.texts("link") == [f"detector blind: {reason}", "the detector sees again"]
+    assert watch.told[-1][0] == pytest.approx(4_976_000, abs=INTERVAL_US)
 
 
 def test_a_touch_that_tips_the_vehicle_over_is_a_crash_as_soon_as_it_lies_there():

@@ -98,17 +98,6 @@ class Flight:
 # --- force --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("direction_deg", [0, 77, 180, 301])
-@pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
-def test_a_foldable_hit_shows_in_the_first_sample_that_holds_it(speed_m_s, direction_deg):
-    c, s = math.cos(math.radians(direction_deg)), math.sin(math.radians(direction_deg))
-    force = 30.0 * speed_m_s
-    impacts = Flight(pulse((force * c, force * s, 0.0), length_us=20_000)).fly()
-    assert [(i.sample_time_boot_us, i.evidence) for i in impacts] == [(3_004_000, Evidence.FORCE)]
-    assert impacts[0].contact_free_until_boot_us <= HIT_US
-    assert impacts[0].kind is ImpactKind.WALL
-
-
 @pytest.mark.parametrize(
     ("push", "kind"), [((0.0, 0.0, 900.0), ImpactKind.CEILING), ((0.0, 0.0, -900.0), ImpactKind.STRUCK)]
 )

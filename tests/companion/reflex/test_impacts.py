@@ -8,7 +8,7 @@ from companion.messages import ImuSample, LocalPosition, Odometry
 from companion.motion.strapdown import LEVEL, VelocityFix
 from companion.reflex.config import CHANGE_RAD, GROUND_M, IMPULSE_RAD, EstimateConfig
 from companion.reflex.detection.classify import FASTEST_LANDING_M_S, Touch, classified
-from companion.reflex.detection.detector import Impact, ImpactKind, Situation
+from companion.reflex.detection.detector import DetectorState, Impact, ImpactKind, Phase, Situation
 from companion.reflex.detection.impact import ContactForce, ImpactEstimator
 from companion.reflex.surface import Normal, normal_of, with_change
 
@@ -31,8 +31,8 @@ def approaching(acceleration_m_s2=0.0):
     return estimator
 
 
-def begun(estimator, kind=ImpactKind.WALL):
-    return estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, 0.0, 0.0), kind))
+def begun(estimator, kind=ImpactKind.WALL, force=(-20.0, 0.0, 0.0)):
+    return estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, force, kind))
 
 
 @pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])
@@ -90,9 +90,34 @@ def test_a_force_whose_clipping_is_hidden_does_not_show_the_normal(hides_clippin
     # Given a vehicle that flies north, and a first force that pushes it south-west
     estimator = approaching()
     estimator.hides_clipping = hides_clipping
-    n, e, _ = estimator.begin(Impact(CONTACT_US + 4_000, CONTACT_US, (-20.0, -20.0, 0.0))).normal.direction_ned
+    normal = begun(estimator, force=(-20.0, -20.0, 0.0)).normal
     # Then the normal is the force's where that is measured, and against the way that it came where it is not
-    assert math.degrees(math.atan2(-e, -n)) == pytest.approx(normal_deg, abs=3.0)
+    assert angle_deg(normal) == pytest.approx(normal_deg, abs=3.0)
+
+
+@pytest.mark.parametrize(("pushes", "is_whole"), [(20, True), (5, False)])
+def test_a_contact_that_is_over_has_the_normal_of_its_whole_impulse_and_is_whole_if_that_stopped_the_vehicle(
+    pushes, is_whole
+):
+    # Given a vehicle that flies north, and a force that is south-west in its first sample and south in the others
+    estimator, state = approaching(), DetectorState(phase=Phase.CONTACT)
+    for number in range(pushes + 1):
+        sample = ImuSample(CONTACT_US + 4_000 * number, (-30.0 * (number > 0), -30.0 * (number == 1), -9.81), STILL)
+        estimator.update(sample)
+        if number == 1:
+            begun(estimator, force=(-30.0, -30.0, 0.0))
+        if number > 1:
+            state.last_loud_boot_us = sample.time_boot_us
+            estimator.follow(sample, state)
+            assert not estimator.estimate.is_final
+    # When it is over
+    state.phase = Phase.ARMED
+    estimator.follow(ImuSample(sample.time_boot_us + 4_000, (0.0, 0.0, -9.81), STILL), state)
+    # Then it is known what it was
+    found = estimator.estimate
+    assert angle_deg(found.normal) == pytest.approx(math.degrees(math.atan2(1, pushes)), abs=0.5)
+    assert found.is_final and found.is_fully_measured is is_whole and found.is_lower_bound is not is_whole
+    assert found.after.normal == found.normal and found.after.is_fully_measured is is_whole
 
 
 def turned(angle_deg, size=1.0):

@@ -11,12 +11,12 @@ from companion.messages import Attitude, LocalPosition
 from companion.motion.config import CURRENT_US, SAME_M_S, TILT_RAD_PER_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
+from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, UNCORRECTED_US, EstimateConfig
 from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
-ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 # A real PX4's, and others: after how long what was hidden is put right, with which frequency and damping.
 PX4, GPS = (0.18, 4.65, 0.665), (0.15, 2.42, 0.69)
 WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
