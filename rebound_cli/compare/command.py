@@ -1,18 +1,19 @@
 """`rebound compare`: the flights, on all cores or a Dask scheduler's workers, and what is written of them."""
 
 import contextlib
+import io
+import multiprocessing
 import os
 import signal
-import subprocess
-import sys
+import threading
 import time
 from argparse import Namespace
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
 from pathlib import Path
 
-from companion.errors import ConfigurationError
+from companion.errors import ConfigurationError, ReboundError
 from rebound_cli.compare.cases import Case, cases_of
 from rebound_cli.compare.page import write_page
 from rebound_cli.compare.rows import Row, row_of, table, write_csv
@@ -59,7 +60,12 @@ def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Pa
     given = {workers.submit(_fly, options.mission.absolute(), airframe, case, out): case for case in cases}
     try:
         for number, done in enumerate(as_completed(given), start=1):
-            case, row = given[done], done.result()
+            case = given[done]
+            try:
+                row = done.result()
+            except (BrokenExecutor, OSError) as error:
+                # A full disk, or a worker that was killed, with which the pool flies no more: what was flown is kept.
+                row = row_of(case, None, f"failed: {error}")
             left_s = (time.monotonic() - began_s) / number * (len(cases) - number)
             hit = row.reason if row.impact_speed_m_s is None else f"hit at {row.impact_speed_m_s:.2f} m/s"
             rest = "" if row.at_rest_after_s is None else f", at rest after {row.at_rest_after_s:.1f} s"
@@ -73,10 +79,11 @@ def _flown(workers: Executor, options: Namespace, cases: Sequence[Case], out: Pa
 def _workers(scheduler: str | None) -> Iterator[Executor]:
     """All cores, or a Dask scheduler's workers. Raises ConfigurationError where nobody answers at its address."""
     if scheduler is None:
-        # No flight outlives a SIGTERM.
+        spawn = multiprocessing.get_context("spawn")
+        # Ctrl-C ends a flight, not a process that waits for the next one. Nor does one outlive a SIGTERM.
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
-            with ThreadPoolExecutor(os.cpu_count()) as pool:
+            with ProcessPoolExecutor(os.cpu_count(), spawn, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
                 yield pool
         finally:
             signal.signal(signal.SIGTERM, before)
@@ -94,11 +101,21 @@ def _workers(scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
+# A worker of Dask has threads, and all share its standard output.
+_ONE_AT_A_TIME = threading.Lock()
+
+
 def _fly(mission: Path, airframe: str | None, case: Case, out: Path) -> Row:
-    """One, by `rebound fly --lockstep` in a process of its own: what ends that costs no other flight."""
-    words = [sys.executable, "-m", "rebound_cli", "fly", str(mission), "--lockstep", "--seed", str(case.seed)]
-    words += ["--out", str(out / case.folder), *([] if airframe is None else ["--airframe", airframe])]
+    """One, as `rebound fly --lockstep` does it; here, in a process of the pool, or in a thread of Dask's."""
+    from rebound_cli.main import build_parser
+
+    words = ["fly", str(mission), "--lockstep", "--seed", str(case.seed), "--out", str(out / case.folder)]
+    words += [] if airframe is None else ["--airframe", airframe]
     words += [word for one in case.sets for word in ("--set", one)]
-    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    said = (done.stderr.strip().splitlines() or [f"it ended with {done.returncode}"])[-1]
-    return row_of(case, read_summary(out / case.folder), said.removeprefix("rebound: "))
+    options, said = build_parser().parse_args(words), io.StringIO()
+    with _ONE_AT_A_TIME, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            options.run(options)
+        except ReboundError as error:
+            return row_of(case, None, str(error))
+    return row_of(case, read_summary(out / case.folder))

@@ -1,6 +1,7 @@
 """Ctrl-C, SIGTERM and SIGHUP: the first hands the vehicle over in good order, the last ends the program at once."""
 
 import signal
+import threading
 from types import FrameType
 from typing import Self
 
@@ -31,7 +32,9 @@ class Interrupts:
         return self.reason
 
     def __enter__(self) -> Self:
-        for number in _REASONS:
+        # Only a program's main thread may hear signals; a flight in another one, as in a worker of Dask, has none.
+        is_main = threading.current_thread() is threading.main_thread()
+        for number in _REASONS if is_main else ():
             self._previous[number] = signal.signal(number, self.on_signal)
         return self
 
