@@ -15,6 +15,8 @@ from sim_vehicle.airframe import Airframe, with_base
 Part = dict[str, Any]
 # What a vehicle's seed is joined with, so that its room is drawn from other numbers.
 _OF_VEHICLES = 1_000_003
+# The same of where its inertial sensor is: drawn apart, so that all else stays as it was.
+_OF_SENSORS = 1_000_033
 # From the paper's two: arms that fold, and a frame that does not.
 AIRFRAMES = ("foldable", "rigid")
 RANGES = yaml.safe_load(Path(__file__).with_name("vehicles.yaml").read_text("utf-8"))
@@ -51,7 +53,7 @@ def drawn_vehicle(seed: int, kind: str) -> Part:
         },
         "motors": {"max_thrust_n": round(mass_kg * 9.81 / 4 / hover_share, 3), "time_constant_s": lag_s},
         "surface": {"guard_friction": draw.number(*RANGES["friction"])},
-        "imu": _imu(draw),
+        "imu": _imu(draw) | {"above_centre_m": Draw(seed, _OF_SENSORS).number(*RANGES["imu_above_centre_m"])},
         "estimate": _estimate(draw),
         "control": _control(draw, lag_s),
         # Last: all else is the same for both kinds.

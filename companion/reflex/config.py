@@ -26,6 +26,13 @@ EXCESS = 1.5
 # different speeds: while they turn alike they cancel each other. In public logs it is 0.32 to 2 times as much.
 LEAST_SIDE_SHARE = 1.0 / 3.0
 
+# --- the accelerometer's place
+# Standard deviation of its height about the point that the vehicle turns about: in public logs it is above it, by 0.02
+# to 0.15 m (bench/notes/decisions.md).
+LEVER_M = 0.05
+# Of a turn with less, in the mean of RATE_MEMORY_US, the gyroscopes' noise of up to 0.1 rad/s hides too much.
+TURNS_RAD_S2 = 10.0
+
 # --- a sample's force
 # A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On
 # any other the least threshold is that of a force that lasts, as of a gust, and two samples together are no more.
@@ -246,7 +253,7 @@ class FusedConfig(StrictModel):
 
     retired = frozenset(
         {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
-        | {"velocity_step_turned_m_s", "velocity_step_slow_m_s", "velocity_per_rate_m", "velocity_rest_s"}
+        | {"velocity_step_turned_m_s", "velocity_step_slow_m_s", "velocity_per_rate_m", "velocity_rest_s", "drag_per_s"}
     )
 
     side_threshold_m_s2: Positive = 1.75
@@ -259,8 +266,6 @@ class FusedConfig(StrictModel):
     noise_factor: Positive = 4.2
     """Threshold over the spread learnt in flight, of each test, which reads 1.5 times the true one: 6.3 standard
     deviations, which sideways two of 10^9 normal samples exceed, one in half a thousand hours at 250 Hz."""
-    drag_per_s: NotNegative = 0.3
-    """Room for drag: per mass it is 0.2 to 0.4 /s times the speed, and turns with the vehicle."""
     velocity_step_m_s: Positive = 0.12
     """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,

@@ -40,6 +40,7 @@ class EstimateErrors:
     rotation: Matrix3  # working memory
     tilt: Vector3  # the same
     step_s: float
+    imu_above_m: float  # height of the inertial sensor above the centre of mass
     late_s: float
     frequency_rad_s: float  # 0: nothing is missed
     damping: float
@@ -67,6 +68,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         drive=sigma * np.sqrt(1 - keep**2),
         since_missed_s=CORRECTED_AFTER_S,
         step_s=interval_s,
+        imu_above_m=airframe.imu.above_centre_m,
         **clipping,
     )
     return errors, np.tile([*body, 0.0, 0.0, 0.0], (slots, 1))
@@ -108,6 +110,12 @@ def note_what_is_clipped(state: PlantState, errors: EstimateErrors, row: Floats)
         row[i] = state.body[i]
     for i in range(3):
         row[HIDDEN + i] = 0.0
+    if errors.imu_above_m != 0.0:
+        # The velocity is that of the sensor, which the vehicle is not told is beside the centre of mass.
+        matrix_from_quaternion(state.body, errors.rotation)
+        p, q = state.body[10], state.body[11]
+        for i in range(3):
+            row[3 + i] += errors.imu_above_m * (errors.rotation[i, 1] * p - errors.rotation[i, 0] * q)
     if errors.frequency_rad_s > 0.0 and abs(off[0]) + abs(off[1]) + abs(off[2]) >= LEAST_HIDDEN_M_S:
         matrix_from_quaternion(state.body, errors.rotation)
         for i in range(3):

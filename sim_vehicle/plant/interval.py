@@ -89,6 +89,7 @@ def advance_interval(
         spin_motors(state, spun, constants, disturbance)
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]
+            scratch.rates_before[i] = state.body[10 + i]
         move_body(state, awake, constants, disturbance, faces, moving, behind, near, forces, scratch)
         add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us

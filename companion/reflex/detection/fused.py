@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
-from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
 from companion.reflex import config as reflex
@@ -38,7 +38,7 @@ from companion.reflex.detection.detector import (
     Phase,
     Situation,
 )
-from companion.reflex.detection.free_flight import ForceNoise
+from companion.reflex.detection.free_flight import ForceNoise, Lever
 from companion.reflex.detection.jumps import RateJump, VelocityJump
 
 
@@ -55,6 +55,7 @@ class FusedState(DetectorState):
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
+    lever: Lever = field(default_factory=Lever)
     jump: VelocityJump = field(default_factory=VelocityJump)
     velocity_ned_m_s: Vector3 | None = None
     moved_boot_us: int = 0
@@ -63,28 +64,25 @@ class FusedState(DetectorState):
     contact_began_boot_us: int = 0
     kind: ImpactKind = ImpactKind.UNKNOWN  # of the present contact, or the latest one
     observed: Impact | None = None  # the first loud sample while it is observed whether that is a hand
-    last_frd_m_s2: Vector3 = ZERO
     before_frd_m_s2: Vector3 = ZERO  # of the sample before the last
     before_threshold_m_s2: float = 0.0  # before the last sample was learnt: it may be a hit's first
     force: tuple[float, Vector3] = (0.0, ZERO)
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
-    def side_threshold_m_s2(self, config: reflex.FusedConfig, rates_frd_rad_s: Vector3) -> float:
-        """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
-        speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
-        p, q, r = rates_frd_rad_s
-        turning_rad_s = abs(p) + abs(q) + abs(r)
-        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, reflex.MEAN_MEMORY_S * turning_rad_s)
+    def side_threshold_m_s2(self, config: reflex.FusedConfig) -> float:
+        """Horizontal threshold, m/s^2. The lever's error adds to the noise as far as motors turn the vehicle."""
+        turned_rad_s2 = min(math.hypot(*self.turn.turned_frd_rad_s2), MOTORS_RAD_S2)
+        return math.hypot(self.threshold_m_s2, config.noise_factor * self.lever.error_m * turned_rad_s2)
 
-    def side_force(self, config: reflex.FusedConfig, sample: ImuSample) -> tuple[float, float, bool]:
+    def side_force(self, config: reflex.FusedConfig, f: Vector3) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
 
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        force, mean = sample.specific_force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2]
-        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config, sample.angular_velocity_frd_rad_s)
+        force, mean = f[:2], self.floor.mean_frd_m_s2[:2]
+        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config)
         if self.phase is not Phase.ARMED:
             return alone, limit, False
         if math.hypot(*mean) > config.side_threshold_m_s2:
@@ -92,18 +90,18 @@ class FusedState(DetectorState):
             alone = min(alone, math.hypot(*force))
         if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, limit, False
-        together, of_two = self._together_m_s2(sample), self.before_threshold_m_s2 / self.threshold_m_s2
+        together, of_two = self._together_m_s2(f), self.before_threshold_m_s2 / self.threshold_m_s2
         if together / of_two > alone / reflex.CLEAR:
             return together, of_two * limit, True
         return alone, reflex.CLEAR * limit, False
 
-    def _together_m_s2(self, sample: ImuSample) -> float:
+    def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
         """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
         noise of a sum grows. Vibration alternates, a contact does not.
 
         Compared with zero, too: a slow swing that the mean has not followed is none.
         """
-        (m_x, m_y, _), both = self.floor.mean_frd_m_s2, plus(sample.specific_force_frd_m_s2, 1.0, self.last_frd_m_s2)
+        (m_x, m_y, _), both = self.floor.mean_frd_m_s2, plus(force_frd_m_s2, 1.0, self.last_frd_m_s2)
         return math.sqrt(0.5) * min(math.hypot(both[0] - 2.0 * m_x, both[1] - 2.0 * m_y), math.hypot(*both[:2]))
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
@@ -146,8 +144,13 @@ class FusedDetector:
 
     def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
-            impact = self._imu(state, sample, situation, motion)
-            state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, sample.specific_force_frd_m_s2
+            before_us, now_us = state.last_sample_boot_us, sample.time_boot_us
+            state.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, self._config)
+            (x, y, z), (p, q, _) = sample.specific_force_frd_m_s2, state.turn.turned_frd_rad_s2
+            below_m = state.lever.below_m
+            force_frd_m_s2 = (x - q * below_m, y + p * below_m, z)
+            impact = self._imu(state, sample, force_frd_m_s2, situation, motion)
+            state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, force_frd_m_s2
             return impact
         if isinstance(sample, (LocalPosition, Odometry)):
             return self._velocity(state, sample, situation, motion)
@@ -157,15 +160,14 @@ class FusedDetector:
 
     # --- force ------------------------------------------------------------------------------------------------
 
-    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
-        config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
+    def _imu(self, s: FusedState, sample: ImuSample, f: Vector3, situation: Situation, motion: Motion) -> Impact | None:
+        config, now_us = self._config, sample.time_boot_us
         off = situation.off_reason
         if off is None and situation.is_on_ground:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
-        s.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, config)
-        s.side.value, s.side.limit, is_of_two = s.side_force(config, sample)
+        s.side.value, s.side.limit, is_of_two = s.side_force(config, f)
         if is_of_two:
             free_until_us = earlier_us
         s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
@@ -194,7 +196,8 @@ class FusedDetector:
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         # Noise hardly brings the sample before so near to its limit, too.
         is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
-        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio), is_shown_twice=is_twice)
+        sure, free = min(1.0, 0.5 * ratio), s.free_frd_m_s2
+        impact = Impact(now_us, free_until_us, force, confidence=sure, is_shown_twice=is_twice, free_frd_m_s2=free)
         if s.phase is Phase.OFF:
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
@@ -240,6 +243,8 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
+            if s.turn.lasting_rad_s2 > reflex.TURNS_RAD_S2:
+                s.lever.learn(minus(f, s.floor.mean_frd_m_s2), s.turn.turned_frd_rad_s2, s.floor.side_m_s2)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2

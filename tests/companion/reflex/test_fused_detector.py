@@ -268,6 +268,26 @@ def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     assert Flight(imu_every_us=imu_every_us, **scene).fly(until_us) == []
 
 
+@pytest.mark.parametrize("above_m", [0.08, -0.05])
+def test_what_a_sensor_beside_the_centre_shows_of_a_turn_is_no_hit_and_a_push_then_is(above_m):
+    # Given a vehicle that rolls to and fro by 60 rad/s^2, its sensor above the centre or below, and a push of 4 m/s^2
+    begins_us, turns_rad_s = 1_500_000, 6e-6 * math.pi
+
+    def turn(t_us):
+        return 60.0 * math.sin(turns_rad_s * max(t_us - begins_us, 0))
+
+    def rates(t_us):
+        return (60e-6 / turns_rad_s * (1.0 - math.cos(turns_rad_s * max(t_us - begins_us, 0))), 0.0, 0.0)
+
+    def push(t_us):
+        return (0.0, above_m * turn(t_us) + (4.0 if t_us >= HIT_US else 0.0), 0.0)
+
+    flight = Flight(push, rates=rates, heard=(Attitude, AttitudeTarget))
+    # When it flies on, then the push alone is a hit, in its first whole sample; where the sensor is has been learnt
+    assert [i.sample_time_boot_us for i in flight.fly(3_500_000)] == [pytest.approx(HIT_US + 4_000, abs=4_000)]
+    assert flight.state.lever.below_m == pytest.approx(-above_m, abs=0.01)
+
+
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
     once = Flight(pulse((0.0, 10.5, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
     assert once.fly() == [] and once.state.threshold_m_s2 > 8.0
