@@ -79,10 +79,12 @@ class SimulatedVehicle:
         # Taken once: looking a record's field up costs microseconds.
         self._body = self.state.body
         identity = Identity(int(self.parameters["MAV_SYS_ID"]), int(self.parameters["MAV_COMP_ID"]))
+        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self._telemetry = Telemetry(
             sample=first,
             published=first,
             autopilot=self._autopilot,
+            slow=self._slow,
             vibration=VibrationMetrics(),
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
@@ -91,7 +93,6 @@ class SimulatedVehicle:
             epoch_at_boot_us=epoch_at_boot_us,
             system=identity.system,
         )
-        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = int(self.state.time_us)
         self._topics = Topics(self._telemetry)
@@ -204,8 +205,8 @@ class SimulatedVehicle:
     def advance(self) -> None:
         """One interval: act on what the links have received, fly, leave what they are to send."""
         self._communicate()
-        if self.parameters.changes != self._tuned_at:
-            self._tuned_at = self.parameters.changes
+        if self.parameters.sets != self._tuned_at:
+            self._tuned_at = self.parameters.sets
             self._plant.tune(position_gains(self.parameters))
         autopilot = self._autopilot
         sample = self._plant.step(autopilot.run_control(), autopilot.motors_run)
@@ -240,8 +241,6 @@ class SimulatedVehicle:
             return
         slow.gps_is_blocked = positioning.is_without_gps
         slow.update(now_us, self._body)
-        telemetry.air, telemetry.gps = slow.air, slow.gps
-        telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 
     def _publish(self, sample: Estimate) -> bool:
         """Hand the sample to the streams; whether position and velocity are published with it."""

@@ -105,8 +105,8 @@ def highres_imu(state: Telemetry) -> Message:
     sample, (field_is_new, air_is_new) = state.sample, state.renewed
     inertial = (*sample.specific_force_frd_m_s2, *sample.angular_velocity_frd_rad_s)
     fields = INERTIAL_FIELDS | (MAGNETIC_FIELDS if field_is_new else 0)
-    fields |= AIR_FIELDS if air_is_new and state.air is not None else 0
-    slow = (*state.magnetic_field_frd_gauss, *air_fields(state.air))
+    fields |= AIR_FIELDS if air_is_new and state.slow.air is not None else 0
+    slow = (*state.slow.magnetic_field_frd_gauss, *air_fields(state.slow.air))
     return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(sample.time_boot_us, *inertial, *slow, fields, 0)
 
 

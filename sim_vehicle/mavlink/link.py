@@ -11,6 +11,7 @@ from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
 from sim_vehicle.mavlink.services.mission_service import MissionService
+from sim_vehicle.mavlink.services.mission_transfer import MissionTransfer
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
@@ -25,6 +26,7 @@ SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
     SetpointService,
     ParameterService,
     MissionService,
+    MissionTransfer,
     FileService,
 )
 
@@ -42,15 +44,13 @@ class Link:
         self._encoder = Encoder(board.identity)
         self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, seed)
         self._texts = TextLink()
-        services = tuple(service(self, board) for service in SERVICES)
-        # Those that have nothing to do with time are not called in every interval.
-        self._services = [service for service in services if type(service).update is not Service.update]
+        self._services = tuple(service(self, board) for service in SERVICES)
         self.handlers: dict[int, Handler] = {
             HEARTBEAT_ID: self._hear_heartbeat,
             4: self._answer_ping,
             111: self._answer_timesync,
         }
-        for service in services:
+        for service in self._services:
             self.handlers.update(service.handlers)
         self._decoder = Decoder(board.identity, self.handlers, self._signing)
 

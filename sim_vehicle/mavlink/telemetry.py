@@ -8,7 +8,7 @@ import numpy as np
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.hil.slow_sensors import SlowSensors
 from sim_vehicle.quantities import Floats, Vector3
 
 _KEPT = 0.99
@@ -46,6 +46,7 @@ class Telemetry:
     sample: Estimate
     published: Estimate
     autopilot: Autopilot
+    slow: SlowSensors
     vibration: VibrationMetrics
     position_variance_m2: float
     velocity_variance_m2_s2: float
@@ -54,9 +55,6 @@ class Telemetry:
     range: RangeSample | None = None
     attitude_setpoint: Floats = field(default_factory=lambda: np.eye(3))
     """The attitude control's R_d (3, 3), body to NED."""
-    gps: HilGps | None = None
-    air: Air | None = None
-    magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
     renewed: tuple[bool, ...] = (False, False)
     """For the message that is being made: see `StreamKind.notes`."""
     epoch_at_boot_us: int = 0

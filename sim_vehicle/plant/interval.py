@@ -2,7 +2,9 @@
 
 import math
 
-from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control, rate_control
+import numpy as np
+
+from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control, track
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
 from sim_vehicle.physics.estimate import update_estimate, update_slope
 from sim_vehicle.physics.imu import add_raw_sample
@@ -122,7 +124,7 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
                 for column in range(3):
                     state.attitude_setpoint[row, column] = asked.attitude[row, column]
         if asked.level == ASKED_RATES:
-            rate_control(state, constants, asked.rates_frd_rad_s)
+            track(state, constants, np.zeros(3), asked.rates_frd_rad_s)
         else:
             attitude_control(state, constants, asked.yaw[2])
         allocate_motors(state, constants)

@@ -6,6 +6,7 @@ Source: PX4's commander/failsafe/framework.cpp. What sets one off stands in `fai
 from dataclasses import dataclass
 
 from sim_vehicle.autopilot.commander.failsafe_table import (
+    MODE_OF,
     Action,
     Clears,
     FailsafeSituation,
@@ -21,15 +22,6 @@ from sim_vehicle.parameters.store import Parameters
 # Below this COM_FAIL_ACT_T there is no delay, and then sticks alone do not take over either.
 _NO_DELAY_S = 0.1
 
-MODE_OF: dict[Action, Mode] = {
-    Action.FALL_BACK_TO_POSITION: Mode.POSCTL,
-    Action.FALL_BACK_TO_ALTITUDE: Mode.ALTCTL,
-    Action.FALL_BACK_TO_STABILIZED: Mode.STABILIZED,
-    Action.HOLD: Mode.LOITER,
-    Action.RETURN: Mode.RETURN,
-    Action.LAND: Mode.LAND,
-    Action.DESCEND: Mode.DESCEND,
-}
 # If its mode cannot run, an action gives way to the next; the last needs nothing.
 _LADDER = tuple(MODE_OF)
 # Modes flown by sticks need no taking over.
@@ -77,8 +69,6 @@ class Failsafe:
         self._intended: Mode | None = None
         self._delay_us = 0
         self._announce = False
-        self._settled: tuple[FailsafeSituation, int, Decision] | None = None
-        """Situation, changes of parameters, and what they came to, while nothing acts and no delay runs."""
 
     @property
     def acts(self) -> bool:
@@ -86,11 +76,7 @@ class Failsafe:
         return self.action > Action.WARN
 
     def update(self, now_us: int, now: FailsafeSituation, parameters: Parameters) -> Decision:
-        """Judge the situation. One that stays as it is, and calls for nothing, is judged once."""
-        settled = self._settled
-        if settled is not None and settled[0] == now and settled[1] == parameters.changes:
-            self._last_us = now_us
-            return settled[2]
+        """Judge the situation."""
         elapsed_us = 0 if self._last_us is None else now_us - self._last_us
         self._last_us = now_us
         if now.armed is not self._armed:
@@ -106,10 +92,7 @@ class Failsafe:
         decision, delayed, took_over = self._select(now, parameters, changed)
         says = self._announcement(decision.action, delayed)
         self.action, self.took_over, self._intended = decision.action, took_over, decision.intended
-        decision = Decision(decision.action, decision.intended, says)
-        waits = self._active or took_over or self._delay_us > 0
-        self._settled = None if waits or says else (now, parameters.changes, decision)
-        return decision
+        return Decision(decision.action, decision.intended, says)
 
     def _announcement(self, action: Action, delayed: Action) -> tuple[str, ...]:
         tells = action > self.action or (action is not Action.NONE and self._announce)

@@ -46,7 +46,7 @@ def sys_status(state: Telemetry) -> Message:
     autopilot, battery = state.autopilot, state.autopilot.battery
     enabled = _PRESENT if state.autopilot.parameters["COM_RC_IN_MODE"] == _NO_STICKS else _PRESENT | _RC_RECEIVER
     health = _WELL | (_PREARM_CHECK if autopilot.commander.checks_pass else 0)
-    if state.gps is None:
+    if state.slow.gps is None:
         health &= ~_GPS
     return dialect.MAVLink_sys_status_message(
         _PRESENT,
@@ -98,7 +98,7 @@ def manual_control(state: Telemetry) -> Message:
 
 
 def scaled_pressure(state: Telemetry) -> Message:
-    air = state.air
+    air = state.slow.air
     assert air is not None, "streamed only once there is a sample"
     return dialect.MAVLink_scaled_pressure_message(
         boot_ms(state.sample), air.pressure_hpa, 0.0, round(100 * air.temperature_c)

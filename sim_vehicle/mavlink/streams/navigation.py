@@ -37,7 +37,7 @@ def global_position_int(state: Telemetry) -> Message:
 
 
 def gps_raw_int(state: Telemetry) -> Message:
-    fix = state.gps
+    fix = state.slow.gps
     if fix is None or state.autopilot.parameters["SIM_GPS_USED"] < 4:
         satellites = int(state.autopilot.parameters["SIM_GPS_USED"]) if fix is not None else 0
         unknown = (_UNKNOWN_16,) * 4
@@ -85,7 +85,7 @@ def altitude(state: Telemetry) -> Message:
     seen = state.range.distance_m if state.range is not None else None
     return dialect.MAVLink_altitude_message(
         state.published.time_boot_us,
-        state.air.altitude_m if state.air is not None else NAN,
+        state.slow.air.altitude_m if state.slow.air is not None else NAN,
         origin_m + height_m,
         height_m,
         height_m + state.autopilot.navigator.view.home_ned_m[2],

@@ -47,9 +47,9 @@ class Topics:
         state, commander = self._state, self._state.autopilot.commander
         return (
             (Topic.STICKS, commander.sticks.sticks),
-            (Topic.AIR, state.air),
-            (Topic.MAGNETIC_FIELD, state.magnetic_field_frd_gauss),
-            (Topic.GPS, state.gps),
+            (Topic.AIR, state.slow.air),
+            (Topic.MAGNETIC_FIELD, state.slow.magnetic_field_frd_gauss),
+            (Topic.GPS, state.slow.gps),
             (Topic.BATTERY, commander.battery.version),
             (Topic.FLOW, state.flow),
             (Topic.RANGE, state.range),

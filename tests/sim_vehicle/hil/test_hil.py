@@ -7,10 +7,10 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import NotInLockstep
-from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.estimator.samples import CaptureSample, FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
-from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor, MotionCapture
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor
 from sim_vehicle.hil.parameters import px4_parameters
 from sim_vehicle.hil.sensors import air_at, to_body
 from sim_vehicle.hil.vehicle import HilVehicle
@@ -52,7 +52,7 @@ def test_a_fix_in_the_units_of_the_protocol():
 
 
 def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
-    sent = on_the_wire(MotionCapture(20_000, (1.0, 2.0, -3.0), (0.8, 0.0, 0.6, 0.0), 4e-6, 2.5e-5))
+    sent = on_the_wire(CaptureSample(20_000, (1.0, 2.0, -3.0), (0.8, 0.0, 0.6, 0.0), 2e-3, 5e-3))
     assert (sent.frame_id, sent.estimator_type) == (dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_ESTIMATOR_TYPE_VISION)
     assert (sent.x, sent.y, sent.z) == (1.0, 2.0, -3.0)
     assert tuple(sent.q) == pytest.approx((0.8, 0.0, 0.6, 0.0))
@@ -187,7 +187,7 @@ def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
     assert all(messages[-1].time_us == 4000 * (i + 1) for i, messages in enumerate(steps))
     everything = [message for messages in steps for message in messages]
     assert len(of_kind(everything, HilGps)) == 10
-    assert len(of_kind(everything, MotionCapture)) == 50
+    assert len(of_kind(everything, CaptureSample)) == 50
     sensors = of_kind(everything, HilSensor)
     assert sum(sensor.magnetic_field_frd_gauss is not None for sensor in sensors) == 50
     assert sum(sensor.air is not None for sensor in sensors) == 50
