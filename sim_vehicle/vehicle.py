@@ -19,7 +19,7 @@ from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.plant.plant import Plant
@@ -85,7 +85,6 @@ class SimulatedVehicle:
             published=first,
             autopilot=self._autopilot,
             slow=self._slow,
-            vibration=VibrationMetrics(),
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
@@ -251,7 +250,6 @@ class SimulatedVehicle:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
         if self._plant.faults.acts or sample.time_boot_us >= self._slow.due_us:
             self._sense(telemetry)
-        telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False
         telemetry.published = sample

@@ -159,11 +159,9 @@ def extended_sys_state(state: Telemetry) -> Message:
 
 
 def vibration(state: Telemetry) -> Message:
-    metrics = state.vibration
+    """What was clipped alone."""
     clipped = sum(state.sample.clipping_counts)
-    return dialect.MAVLink_vibration_message(
-        state.sample.time_boot_us, 0.0, metrics.gyroscope_rad_s, metrics.accelerometer_m_s2, clipped, 0, 0
-    )
+    return dialect.MAVLink_vibration_message(state.sample.time_boot_us, 0.0, 0.0, 0.0, clipped, 0, 0)
 
 
 def timesync(state: Telemetry) -> Message:
