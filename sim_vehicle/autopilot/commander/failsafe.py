@@ -35,10 +35,10 @@ _NOT_DELAYED = (Action.NONE, Action.WARN, Action.HOLD)
 class _Active:
     """An action that was set off and has not ended."""
 
-    response: Response
+    action: Action
+    clears: Clears
     takeover: Takeover
     failing: bool = True
-    checked: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,24 +106,22 @@ class Failsafe:
     # --- which actions are in force ------------------------------------------------------------------------
 
     def _check(self, now: FailsafeSituation, parameters: Parameters) -> None:
-        for trigger, response in responses_now(now, parameters):
-            self._set_off(trigger, response, parameters)
+        found = dict(responses_now(now, parameters))
         fallback = mode_fallback(now, parameters, now.intended)
         if fallback is not Action.NONE:
-            self._set_off(FailsafeTrigger.MODE_CANNOT_RUN, Response(fallback, takeover=Takeover.ALWAYS), parameters)
+            found[FailsafeTrigger.MODE_CANNOT_RUN] = Response(fallback, takeover=Takeover.ALWAYS)
+        for trigger, response in found.items():
+            self._set_off(trigger, response, parameters)
         for trigger, active in list(self._active.items()):
-            if not active.checked:
-                active.failing = False
-                if active.response.clears is Clears.AT_ONCE:
-                    del self._active[trigger]
-            active.checked = False
+            active.failing = trigger in found
+            if not active.failing and active.clears is Clears.AT_ONCE:
+                del self._active[trigger]
 
     def _set_off(self, trigger: FailsafeTrigger, response: Response, parameters: Parameters) -> None:
         active = self._active.get(trigger)
         if active is not None:
             # The action may change meanwhile; how it ends and who may end it stays.
-            kept = Response(response.action, active.response.clears, active.response.takeover)
-            active.response, active.failing, active.checked = kept, True, True
+            active.action = response.action
             return
         takeover = response.takeover
         if takeover is Takeover.AFTER_DELAY:
@@ -132,14 +130,14 @@ class Failsafe:
                 takeover = Takeover.ALWAYS
                 if response.action is not Action.WARN and self._delay_us == 0:
                     self._delay_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
-        self._active[trigger] = _Active(response, takeover)
+        self._active[trigger] = _Active(response.action, response.clears, takeover)
         self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:
             self.took_over = False
 
     def _forget_kept(self) -> None:
         for trigger, active in list(self._active.items()):
-            if not active.failing and active.response.clears is Clears.MODE_CHANGE_OR_DISARM:
+            if not active.failing and active.clears is Clears.MODE_CHANGE_OR_DISARM:
                 del self._active[trigger]
 
     # --- which of them flies -------------------------------------------------------------------------------
@@ -148,7 +146,7 @@ class Failsafe:
         """The decision, the action that waits behind it, and whether the pilot has it."""
         if not now.armed or now.intended is Mode.TERMINATION:
             return Decision(Action.NONE, now.intended), Action.NONE, False
-        action = max((active.response.action for active in self._active.values()), default=Action.NONE)
+        action = max((active.action for active in self._active.values()), default=Action.NONE)
         takeover = max((active.takeover for active in self._active.values()), default=Takeover.ALWAYS)
         delayed, intended, took_over = Action.NONE, now.intended, False
         may_wait = takeover <= Takeover.BY_MODE_SWITCH and action not in _NOT_DELAYED
