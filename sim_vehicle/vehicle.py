@@ -220,26 +220,13 @@ class SimulatedVehicle:
     def _communicate(self) -> None:
         # The commander runs beside the receivers: it answers in the interval after a command came.
         acks = self._autopilot.run_commander()
-        links = self._links
-        for link in links:
+        for link in self._links:
             if acks:
                 link.acknowledge(acks)
-            foreign = link.receive(collects_foreign=len(links) > 1)
-            if foreign:
-                for other in links:
-                    if other is not link:
-                        other.forward(foreign)
-
-    def _sense(self, telemetry: Telemetry) -> None:
-        slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
-        positioning = self._positioning
-        if faults.acts:
-            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
-            self._autopilot.battery.supply_share = faults.motors.voltage_share
-        if now_us < slow.due_us:
-            return
-        slow.gps_is_blocked = positioning.is_without_gps
-        slow.update(now_us, self._body)
+            foreign = link.receive()
+            for other in self._links:
+                if other is not link:
+                    other.forward(foreign)
 
     def _publish(self, sample: Estimate) -> bool:
         """Hand the sample to the streams; whether position and velocity are published with it."""
@@ -248,8 +235,12 @@ class SimulatedVehicle:
         onboard = self._plant.onboard
         if onboard is not None:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
-        if self._plant.faults.acts or sample.time_boot_us >= self._slow.due_us:
-            self._sense(telemetry)
+        faults, positioning = self._plant.faults, self._positioning
+        if faults.acts:
+            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
+            self._autopilot.battery.supply_share = faults.motors.voltage_share
+        if sample.time_boot_us >= self._slow.due_us:
+            self._slow.update(sample.time_boot_us, self._body, positioning.is_without_gps)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False
         telemetry.published = sample

@@ -57,10 +57,10 @@ class FaultyLink(Link):
         now_s = self.now_us / 1e6
         self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
 
-    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
+    def receive(self) -> list[ForeignPacket]:
         """Act on what has arrived: bytes that were pushed do when the wire lets them."""
         self._waiting = b"".join(self._inbound.carry(split(self._waiting), self.now_us))
-        return super().receive(collects_foreign)
+        return super().receive()
 
     def take(self) -> tuple[bytes, ...]:
         """The packets that arrive at the other end now, in order."""

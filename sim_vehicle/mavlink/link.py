@@ -80,17 +80,16 @@ class Link:
             if (ack.target_system, ack.target_component) in self._decoder.sources:
                 self.send(encode.command_ack(ack))
 
-    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
-        """Act on the packets that the waiting bytes complete; those for others are returned, where asked for."""
+    def receive(self) -> list[ForeignPacket]:
+        """Act on the packets that the waiting bytes complete; return those for others."""
         if not self._waiting:
             return []
         data, self._waiting = self._waiting, b""
         decoder, parameters = self._decoder, self._board.autopilot.parameters
-        decoder.foreign = [] if collects_foreign else None
         decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == OPTIONAL
         for packet in decoder.push(data):
             self.handlers[packet.get_msgId()](packet)
-        return decoder.foreign or []
+        return decoder.foreign
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
         """Pass on what came over other links, if somebody here may want it."""
