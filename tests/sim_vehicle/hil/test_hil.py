@@ -12,7 +12,7 @@ from sim_vehicle.geography import Place
 from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor
 from sim_vehicle.hil.parameters import px4_parameters
-from sim_vehicle.hil.sensors import air_at, to_body
+from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import Encoder
@@ -151,25 +151,11 @@ def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
         exchange.received(wrong)
 
 
-HALF = math.sqrt(0.5)
 FOLDABLE = load_built_in("foldable")
 
 
 def of_kind(messages: list, kind: type) -> list:
     return [message for message in messages if isinstance(message, kind)]
-
-
-@pytest.mark.parametrize(
-    ("attitude", "seen"),
-    [
-        ((1.0, 0.0, 0.0, 0.0), (1, 2, 3)),
-        ((HALF, 0.0, 0.0, HALF), (2, -1, 3)),  # the nose sees east, the right side looks south
-        ((HALF, 0.0, HALF, 0.0), (-3, 2, 1)),  # the nose looks up, the belly north
-        ((HALF, HALF, 0.0, 0.0), (1, 3, -2)),  # the right side sees down, the belly looks west
-    ],
-)
-def test_a_vector_of_the_world_in_the_body(attitude, seen):
-    assert to_body(attitude, (1.0, 2.0, 3.0)) == pytest.approx(seen)
 
 
 def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
