@@ -37,7 +37,6 @@ class OffboardSignal:
         self.arrives = False
         self.is_back = False
         """Whether it has arrived for long enough to end a failsafe."""
-        self.ever_arrived = False
         self.needs_place = False
         """The last setpoint was one of position or velocity, which nobody flies without knowing them."""
         self._first_us = 0
@@ -50,7 +49,6 @@ class OffboardSignal:
         if self._last_us is None:
             self._first_us = now_us
         self._last_us = now_us
-        self.ever_arrived = True
 
     def update(self, now_us: int) -> bool:
         """Judge the stream, at every step; whether the judgement is another."""

@@ -94,7 +94,7 @@ def heartbeat(state: Telemetry) -> Message:
     return dialect.MAVLink_heartbeat_message(
         int(state.autopilot.parameters["MAV_TYPE"]),
         dialect.MAV_AUTOPILOT_PX4,
-        base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
+        base_mode(mode, autopilot.arming.armed),
         NUMBERS[mode].custom_mode,
         autopilot.commander.system_status,
         3,

@@ -13,9 +13,15 @@ from sim_vehicle.mavlink.services.service import Board, Channel, Service
 _HEADER = struct.Struct("<HBBBBBBI")
 PAYLOAD_BYTES = 251
 
-_RESET, _LIST = 2, 3
+_RESET, _LIST, _OPEN, _CRC, _BURST_READ = 2, 3, 4, 14, 15
 _ACK, _NAK = 128, 129
-_END_OF_FILE, _NO_SUCH_FILE = 6, 10
+_NO_SESSION, _END_OF_FILE, _UNKNOWN_COMMAND, _PROTECTED, _NO_SUCH_FILE = 4, 6, 7, 9, 10
+# What ends, reads or writes a session that cannot be there; what names a file that is not; what would make one.
+_REFUSALS = {
+    **dict.fromkeys((1, 5, 7, _BURST_READ), _NO_SESSION),
+    **dict.fromkeys((_LIST, _OPEN, 8, 10, 12, 13, _CRC), _NO_SUCH_FILE),
+    **dict.fromkeys((6, 9, 11), _PROTECTED),
+}
 _ROOT = (b"", b"/")
 
 
@@ -31,10 +37,15 @@ class FileService(Service):
         number, session, operation, size, *_ = _HEADER.unpack_from(asked)
         if operation >= _ACK:
             return
-        # A list of the root is at its end, as after the last name of a folder; there is nothing to reset.
-        lists_root = operation == _LIST and asked[_HEADER.size :][:size].rstrip(b"\0") in _ROOT
-        why = b"" if operation == _RESET else bytes([_END_OF_FILE if lists_root else _NO_SUCH_FILE])
-        answer = _HEADER.pack((number + 1) & 0xFFFF, session, _NAK if why else _ACK, len(why), operation, 0, 0, 0)
-        payload = (answer + why).ljust(PAYLOAD_BYTES, b"\0")
+        next_number = (number + 1) & 0xFFFF
+        if operation == _RESET:
+            answer = _HEADER.pack(next_number, session, _ACK, 0, operation, 0, 0, 0)
+        else:
+            why = _REFUSALS.get(operation, _UNKNOWN_COMMAND)
+            if operation == _LIST and asked[_HEADER.size :][:size].rstrip(b"\0") in _ROOT:
+                # As after the last name of a folder
+                why = _END_OF_FILE
+            answer = _HEADER.pack(next_number, session, _NAK, 1, operation, 0, 0, 0) + bytes([why])
+        payload = answer.ljust(PAYLOAD_BYTES, b"\0")
         target = (packet.get_srcSystem(), packet.get_srcComponent())
         self._link.send(dialect.MAVLink_file_transfer_protocol_message(0, *target, payload))

@@ -35,6 +35,7 @@ _NO_STICKS = 4
 _LOAD_PER_MILLE = 100
 
 _UNKNOWN_16 = 0xFFFF
+_UNKNOWN_CURRENT = -1
 _UNKNOWN_TEMPERATURE = 0x7FFF
 # PWM of the simulated outputs: off, and from least to greatest.
 PWM_OFF_US, PWM_LEAST_US, PWM_SPAN_US = 900, 1000, 1000
@@ -54,7 +55,7 @@ def sys_status(state: Telemetry) -> Message:
         health,
         _LOAD_PER_MILLE,
         _millivolts(battery.voltage_v),
-        round(100 * battery.current_a),
+        _UNKNOWN_CURRENT,
         math.ceil(100 * battery.remaining),
         *_NO_LINK_STATISTICS,
         _EXTENDED_WELL,
@@ -71,8 +72,8 @@ def battery_status(state: Telemetry) -> Message:
         dialect.MAV_BATTERY_TYPE_LIPO,
         _UNKNOWN_TEMPERATURE,
         voltages,
-        round(100 * battery.current_a),
-        int(battery.consumed_mah),
+        _UNKNOWN_CURRENT,
+        0,
         -1,
         round(100 * battery.remaining),
         0,

@@ -131,10 +131,16 @@ def test_unsigned_packets_are_taken_where_the_parameter_says(guarded, sign_cfg, 
     assert bool(guarded.ends[1].all("COMMAND_ACK")) == heard
 
 
-# As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
-@pytest.mark.parametrize(
-    ("operation", "path", "code"), [(3, b"/", 6), (3, b"", 6), (3, b"/nope", 10), (4, b"/nope", 10), (2, b"", None)]
-)
+# MAVSDK goes by the codes. As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
+FILE_REQUESTS = [
+    *[(3, b"/", 6), (3, b"", 6), (3, b"/nope", 10), (4, b"/nope", 10), (14, b"/nope", 10), (10, b"/nope", 10)],
+    *[(13, b"/a\0/b", 10), (5, b"", 4), (15, b"", 4), (1, b"", 4), (99, b"", 7), (2, b"", None)],
+    # It makes folders and files; here nothing can be written
+    *[(9, b"/new", 9), (6, b"/new", 9)],
+]
+
+
+@pytest.mark.parametrize(("operation", "path", "code"), FILE_REQUESTS)
 def test_who_asks_for_files_is_told_that_there_are_none(operation, path, code):
     vehicle = Vehicle(ONBOARD)
     (end,) = vehicle.ends

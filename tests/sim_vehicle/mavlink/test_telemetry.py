@@ -104,21 +104,16 @@ def test_magnetometer_and_barometer_are_marked_when_they_are_new():
     assert sum(bool(f & 0x1A00) for f in fields) / 10 == pytest.approx(20.8, abs=0.5)
 
 
-def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_ground():
+def test_the_battery_drains_in_flight_and_is_full_again_on_the_ground():
     client = Client()
     client.send(dialect.MAVLink_param_set_message(1, 1, b"SIM_BAT_DRAIN", 20.0, 9))
     client.run(3.0)
     at_rest = client.last("BATTERY_STATUS")
-    client.take_off(6.0)
-    flying = client.last("BATTERY_STATUS")
     # 20 s would empty it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
-    client.run(10.0)
+    client.take_off(16.0)
     late = client.last("BATTERY_STATUS")
     assert at_rest.battery_remaining == 100 and at_rest.charge_state == 1
-    assert flying.current_battery > 1000 > at_rest.current_battery
-    assert at_rest.voltages[0] - flying.voltages[0] > 200
-    assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 300
-    assert late.current_consumed > 30
+    assert late.battery_remaining == 50 and late.voltages[0] < at_rest.voltages[0] - 300
     assert client.last("SYS_STATUS").battery_remaining == 50
     client.send(dialect.MAVLink_param_set_message(1, 1, b"BAT1_V_CHARGED", 1e30, 9))
     client.run(2.1)
