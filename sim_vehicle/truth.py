@@ -13,7 +13,6 @@ from sim_vehicle.world import World
 
 # Columns of one row of the path: time, position, velocity, attitude, contact force, folds.
 _ROW = 1 + 3 + 3 + 4 + 1 + MOST_ROTORS
-_FIRST_ROWS = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +91,12 @@ class TruthRecorder:
     faults: list[FaultSpan] = field(default_factory=list)
     on_hit: Callable[[Hit], None] | None = None
     """Told of each as soon as it is over."""
-    _rows: Floats = field(default_factory=lambda: np.empty((_FIRST_ROWS, _ROW)))
-    _used: int = 0
+    _path: bytearray = field(default_factory=bytearray)
 
     def record(self, row: Floats) -> None:
         """Add the true columns of a report to the path."""
-        if not self.keeps_path:
-            return
-        if self._used == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[self._used] = row
-        self._used += 1
+        if self.keeps_path:
+            self._path += row.tobytes()
 
     def add_hit(self, row: Floats, world: World) -> None:
         """Add a finished row of `PlantState.finished_hits`."""
@@ -130,7 +124,7 @@ class TruthRecorder:
 
     def series(self) -> dict[str, Floats]:
         """The path, one row an IMU interval: arrays by name, each with frame and unit in it."""
-        rows = self._rows[: self._used]
+        rows = np.frombuffer(bytes(self._path)).reshape(-1, _ROW)
         return {
             "time_boot_us": rows[:, 0],
             "position_ned_m": rows[:, 1:4],

@@ -19,7 +19,7 @@ from sim_vehicle.mavlink.services.service import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.telemetry import Telemetry, VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.plant.plant import Plant
@@ -79,11 +79,12 @@ class SimulatedVehicle:
         # Taken once: looking a record's field up costs microseconds.
         self._body = self.state.body
         identity = Identity(int(self.parameters["MAV_SYS_ID"]), int(self.parameters["MAV_COMP_ID"]))
+        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self._telemetry = Telemetry(
             sample=first,
             published=first,
             autopilot=self._autopilot,
-            vibration=VibrationMetrics(),
+            slow=self._slow,
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
@@ -91,7 +92,6 @@ class SimulatedVehicle:
             epoch_at_boot_us=epoch_at_boot_us,
             system=identity.system,
         )
-        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = int(self.state.time_us)
         self._topics = Topics(self._telemetry)
@@ -204,8 +204,8 @@ class SimulatedVehicle:
     def advance(self) -> None:
         """One interval: act on what the links have received, fly, leave what they are to send."""
         self._communicate()
-        if self.parameters.changes != self._tuned_at:
-            self._tuned_at = self.parameters.changes
+        if self.parameters.sets != self._tuned_at:
+            self._tuned_at = self.parameters.sets
             self._plant.tune(position_gains(self.parameters))
         autopilot = self._autopilot
         sample = self._plant.step(autopilot.run_control(), autopilot.motors_run)
@@ -220,28 +220,13 @@ class SimulatedVehicle:
     def _communicate(self) -> None:
         # The commander runs beside the receivers: it answers in the interval after a command came.
         acks = self._autopilot.run_commander()
-        links = self._links
-        for link in links:
+        for link in self._links:
             if acks:
                 link.acknowledge(acks)
-            foreign = link.receive(collects_foreign=len(links) > 1)
-            if foreign:
-                for other in links:
-                    if other is not link:
-                        other.forward(foreign)
-
-    def _sense(self, telemetry: Telemetry) -> None:
-        slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
-        positioning = self._positioning
-        if faults.acts:
-            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
-            self._autopilot.battery.supply_share = faults.motors.voltage_share
-        if now_us < slow.due_us:
-            return
-        slow.gps_is_blocked = positioning.is_without_gps
-        slow.update(now_us, self._body)
-        telemetry.air, telemetry.gps = slow.air, slow.gps
-        telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
+            foreign = link.receive()
+            for other in self._links:
+                if other is not link:
+                    other.forward(foreign)
 
     def _publish(self, sample: Estimate) -> bool:
         """Hand the sample to the streams; whether position and velocity are published with it."""
@@ -250,9 +235,12 @@ class SimulatedVehicle:
         onboard = self._plant.onboard
         if onboard is not None:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
-        if self._plant.faults.acts or sample.time_boot_us >= self._slow.due_us:
-            self._sense(telemetry)
-        telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
+        faults, positioning = self._plant.faults, self._positioning
+        if faults.acts:
+            positioning.gps_is_jammed = faults.gps_is_lost(self.time_boot_us / 1e6)
+            self._autopilot.battery.supply_share = faults.motors.voltage_share
+        if sample.time_boot_us >= self._slow.due_us:
+            self._slow.update(sample.time_boot_us, self._body, positioning.is_without_gps)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False
         telemetry.published = sample

@@ -102,7 +102,7 @@ class Autopilot:
         """Take what the sensors and the estimator say at the end of an interval."""
         self._estimate = estimate
         self._now_us = estimate.time_boot_us
-        self.battery.update(self._now_us, self.arming.armed, estimate.thrust_fraction)
+        self.battery.update(self._now_us, self.arming.armed)
 
     def begin_in_flight(self, goal: NavigatorTarget) -> None:
         """As after a while on the way in HOLD: armed, off the ground, with a demand for the motors."""

@@ -42,8 +42,7 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.RETURN: ModeNumbers(custom_mode(4, 5), _AUTO, 5, "Return"),
     Mode.LAND: ModeNumbers(custom_mode(4, 6), _AUTO, 7, "Land"),
     Mode.FOLLOW_TARGET: ModeNumbers(custom_mode(4, 8), _AUTO, 0, "Follow Target"),
-    # Stabilised too as soon as a setpoint has said what is controlled: see `base_mode`.
-    Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG, 0, "Offboard"),
+    Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG | STABILIZE_FLAG, 0, "Offboard"),
     Mode.STABILIZED: ModeNumbers(custom_mode(7), _STICKS, 0, "Stabilized"),
     Mode.TERMINATION: ModeNumbers(custom_mode(10), CUSTOM_FLAG, 0, "Termination"),
     # Sinking without a position shows itself as landing.
@@ -55,12 +54,9 @@ _MODE_OF_CUSTOM = {numbers.custom_mode: mode for mode, numbers in NUMBERS.items(
 _POSITION_MAIN_MODE = 3
 
 
-def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
-    """HEARTBEAT.base_mode of a shown mode; ``had_setpoint``: any valid offboard setpoint since boot."""
-    flags = NUMBERS[mode].base_mode
-    if mode is Mode.OFFBOARD and had_setpoint:
-        flags |= STABILIZE_FLAG
-    return flags | ARMED_FLAG if armed else flags
+def base_mode(mode: Mode, armed: bool) -> int:
+    """HEARTBEAT.base_mode of a shown mode."""
+    return NUMBERS[mode].base_mode | (ARMED_FLAG if armed else 0)
 
 
 def mode_from_request(base: int, main: int, sub: int) -> Mode | None:

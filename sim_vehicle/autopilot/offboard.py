@@ -12,7 +12,6 @@ from sim_vehicle.estimator.estimate import level_to_north_east, to_ned, yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.quantities import Axis3, Quaternion
 
-_GREATEST_FLOAT = (2.0 - 2.0**-23) * 2.0**127
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8
 
@@ -38,7 +37,6 @@ class OffboardSignal:
         self.arrives = False
         self.is_back = False
         """Whether it has arrived for long enough to end a failsafe."""
-        self.ever_arrived = False
         self.needs_place = False
         """The last setpoint was one of position or velocity, which nobody flies without knowing them."""
         self._first_us = 0
@@ -51,7 +49,6 @@ class OffboardSignal:
         if self._last_us is None:
             self._first_us = now_us
         self._last_us = now_us
-        self.ever_arrived = True
 
     def update(self, now_us: int) -> bool:
         """Judge the stream, at every step; whether the judgement is another."""
@@ -84,8 +81,8 @@ def trajectory_setpoint(target: PositionTarget, attitude_wxyz: Quaternion) -> Tr
     """The valid ``target`` in local NED; one that leaves an axis without any demand means stop."""
     position, velocity, acceleration = _controlled(target)
     if target.frame == FRAME_BODY_NED:
-        velocity = _representable(_turned_by_yaw(velocity, attitude_wxyz))
-        acceleration = _representable(_turned(acceleration, attitude_wxyz))
+        velocity = _turned_by_yaw(velocity, attitude_wxyz)
+        acceleration = _turned(acceleration, attitude_wxyz)
     if not _is_complete(position, velocity, acceleration):
         return STOP
     return TrajectorySetpoint(position, velocity, acceleration, target.yaw_rad, target.yaw_rate_rad_s)
@@ -143,12 +140,6 @@ def _turned(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
     """Body FRD to NED by the whole attitude."""
     x, y, z = vector
     return FREE if x is None or y is None or z is None else to_ned(attitude_wxyz, (x, y, z))
-
-
-def _representable(vector: Axis3) -> Axis3:
-    """What a 32-bit float cannot hold turns infinite in PX4, which flies none of it."""
-    x, y, z = (None if value is None or abs(value) > _GREATEST_FLOAT else value for value in vector)
-    return x, y, z
 
 
 class OffboardControl:

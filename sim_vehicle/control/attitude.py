@@ -26,35 +26,24 @@ def attitude_control(state: PlantState, constants: Constants, yaw_rate_rad_s: fl
     d = state.attitude_setpoint
     product = d.T @ r
     error = np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
+    track(state, constants, error, product[2] * yaw_rate_rad_s)
+
+
+@njit
+def track(state: PlantState, constants: Constants, error: Floats, asked_frd_rad_s: Floats) -> None:
+    """Set the moment of ``state`` for twice an e_R and asked body rates; without an error it is the rate loop."""
     rates = np.empty(3)
     for i in range(3):
         rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
-    carried = _carried(state, rates)
+    p, q, r = rates[0], rates[1], rates[2]
+    x, y, z = times(state.inertia, p, q, r)
+    fx, fy, fz = times(state.inertia_rate, p, q, r)
+    # W x J W + J' W: what the body's own turning calls for.
+    carried = np.array([q * z - r * y + fx, r * x - p * z + fy, p * y - q * x + fz])
     for i in range(3):
-        asked_rate = product[2, i] * yaw_rate_rad_s
         state.moment_frd_n_m[i] = (
-            -constants.k_r[i] * 0.5 * error[i] - constants.k_omega[i] * (rates[i] - asked_rate) + carried[i]
+            -constants.k_r[i] * 0.5 * error[i] - constants.k_omega[i] * (rates[i] - asked_frd_rad_s[i]) + carried[i]
         )
-
-
-@njit
-def rate_control(state: PlantState, constants: Constants, asked_frd_rad_s: Floats) -> None:
-    """Set the moment of ``state`` for asked body rates: eq. 5 without its e_R."""
-    rates = np.empty(3)
-    for i in range(3):
-        rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
-    carried = _carried(state, rates)
-    for i in range(3):
-        state.moment_frd_n_m[i] = -constants.k_omega[i] * (rates[i] - asked_frd_rad_s[i]) + carried[i]
-
-
-@njit
-def _carried(state: PlantState, rates: Floats) -> Floats:
-    """W x J W + J' W, what the body's own turning calls for."""
-    p, q, r_z = rates[0], rates[1], rates[2]
-    x, y, z = times(state.inertia, p, q, r_z)
-    fx, fy, fz = times(state.inertia_rate, p, q, r_z)
-    return np.array([q * z - r_z * y + fx, r_z * x - p * z + fy, p * y - q * x + fz])
 
 
 @njit

@@ -18,6 +18,8 @@ FIRST_TILT_RAD = 0.03
 # It begins where its local frame begins.
 FIRST_POSITION_M = 0.01
 FIRST_VELOCITY_M_S = 0.01
+# What is forgotten may be this far off: beside it, a sensor's noise is nothing.
+ANYWHERE_M = 1e3
 
 
 class NavigationFilter:
@@ -125,17 +127,13 @@ class NavigationFilter:
         self.nominal[strapdown.VELOCITY + 1] += 2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right
         self._forget(slice(strapdown.D_VELOCITY, strapdown.D_VELOCITY + 2), distance_m * noise_rad / seconds)
 
-    def reset_height(self, distance_m: float, noise_m: float) -> None:
-        """Take the range's word for the height."""
-        row = np.empty(strapdown.ERROR_ROWS)
-        predicted_m = strapdown.down_range(self.nominal, row)
-        self.nominal[strapdown.POSITION + 2] += (distance_m - predicted_m) / float(row[strapdown.D_POSITION + 2])
-        self._forget(slice(strapdown.D_POSITION + 2, strapdown.D_POSITION + 3), noise_m)
+    def forget_height(self) -> None:
+        """Let the next distance say it."""
+        self._forget(slice(strapdown.D_POSITION + 2, strapdown.D_POSITION + 3), ANYWHERE_M)
 
-    def reset_position(self, position_ned_m: Vector3, noise_m: float, speed_noise_m_s: float) -> None:
-        """Take motion capture's word for the position; the velocity that led astray is open again."""
-        self.nominal[strapdown.POSITION : strapdown.POSITION + 3] = position_ned_m
-        self._forget(slice(strapdown.D_POSITION, strapdown.D_POSITION + 3), noise_m)
+    def forget_position(self, speed_noise_m_s: float) -> None:
+        """Let motion capture say it; the velocity that led astray is open again."""
+        self._forget(slice(strapdown.D_POSITION, strapdown.D_POSITION + 3), ANYWHERE_M)
         self._forget(slice(strapdown.D_VELOCITY, strapdown.D_VELOCITY + 3), speed_noise_m_s)
 
     def _forget(self, rows: slice, deviation: float) -> None:

@@ -7,14 +7,16 @@ import math
 import random
 from collections import deque
 from enum import Enum, auto
+from typing import Any
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.estimator import strapdown
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.estimator.filter import NavigationFilter
 from sim_vehicle.estimator.samples import NO_QUALITY, CaptureSample, FlowSample, RangeSample, Sample
-from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, DownwardSensors
+from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, Sensor, downward_sensors
 from sim_vehicle.estimator.strapdown import FORCE, RATES
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
@@ -82,9 +84,11 @@ class OnboardEstimator:
         self._airframe = airframe
         self._interval_us = interval_us
         self._step_s = 1e-6 * interval_us
-        self._downward = DownwardSensors(sensors, interval_us, rng)
-        self._compass = CompassSensor(sensors.compass, interval_us, rng)
-        self._cameras = CaptureSensor(sensors.motion_capture, interval_us, rng)
+        self._sensors: list[Sensor[Any, Any]] = [*downward_sensors(sensors, interval_us, rng)]
+        if sensors.compass.fitted:
+            self._sensors.append(CompassSensor(sensors.compass, interval_us, rng))
+        if sensors.motion_capture.fitted:
+            self._sensors.append(CaptureSensor(sensors.motion_capture, interval_us, rng))
         self._has_cameras = sensors.motion_capture.fitted
         self._rest = RestDetector(interval_us)
         # At least one sample behind, so that the output predictor always has one to go by.
@@ -151,17 +155,15 @@ class OnboardEstimator:
     # --- sensing: the only place that looks at the truth ----------------------------------------------------
 
     def _sense(self, time_us: int, body: Floats, faces: Floats) -> None:
-        sensors, waiting = self._airframe.sensors, self._waiting
-        for sample in self._downward.observe(time_us, body, faces):
+        for sensor in self._sensors:
+            sample = sensor.observe(time_us, body, faces)
+            if sample is None:
+                continue
             if isinstance(sample, FlowSample):
                 self.flow = sample
-            else:
+            elif isinstance(sample, RangeSample):
                 self.range = sample
-            waiting.append(sample)
-        if sensors.compass.fitted and (heading := self._compass.observe(time_us, body)) is not None:
-            waiting.append(heading)
-        if sensors.motion_capture.fitted and (capture := self._cameras.observe(time_us, body)) is not None:
-            waiting.append(capture)
+            self._waiting.append(sample)
 
     # --- fusing ---------------------------------------------------------------------------------------------
 
@@ -203,18 +205,20 @@ class OnboardEstimator:
         if not self.filter.fuse_range(sample.distance_m, noise_m, gate):
             if not self._is_lost(_Aided.HEIGHT, sample.time_us):
                 return
-            self.filter.reset_height(sample.distance_m, noise_m)
+            self.filter.forget_height()
+            self.filter.fuse_range(sample.distance_m, noise_m, math.inf)
             self.reset_counter += 1
         self._fused_us[_Aided.HEIGHT] = sample.time_us
 
     def _fuse_capture(self, sample: CaptureSample) -> None:
-        spec, gate = self._airframe.sensors.motion_capture, self._airframe.estimator.capture_gate
-        if not self.filter.fuse_position(sample.position_ned_m, spec.noise_m, gate):
+        tuning = self._airframe.estimator
+        if not self.filter.fuse_position(sample.position_ned_m, sample.noise_m, tuning.capture_gate):
             if not self._is_lost(_Aided.POSITION, sample.time_us):
                 return
-            self.filter.reset_position(sample.position_ned_m, spec.noise_m, _SPEED_AFTER_RESET_M_S)
+            self.filter.forget_position(_SPEED_AFTER_RESET_M_S)
+            self.filter.fuse_position(sample.position_ned_m, sample.noise_m, math.inf)
             self.reset_counter += 1
-        self.filter.fuse_heading(sample.yaw_rad, spec.noise_rad, self._airframe.estimator.heading_gate)
+        self.filter.fuse_heading(yaw_of(sample.attitude_wxyz), sample.noise_rad, tuning.heading_gate)
         self._fused_us[_Aided.POSITION] = sample.time_us
         self._fused_us[_Aided.VELOCITY] = sample.time_us
 

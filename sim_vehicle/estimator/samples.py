@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from sim_vehicle.quantities import Vector3
+from sim_vehicle.quantities import Quaternion, Vector3
 
 NO_QUALITY, BEST_QUALITY = 0, 255
 
@@ -45,11 +45,14 @@ class HeadingSample:
 
 @dataclass(frozen=True, slots=True)
 class CaptureSample:
-    """Position and heading as cameras around the room see them."""
+    """What cameras around the room see; PX4 takes it as external vision, and only if EKF2_EV_CTRL says so."""
 
     time_us: int
     position_ned_m: Vector3
-    yaw_rad: float
+    attitude_wxyz: Quaternion
+    noise_m: float
+    """Standard deviation per axis."""
+    noise_rad: float
 
 
 Sample: TypeAlias = FlowSample | RangeSample | HeadingSample | CaptureSample

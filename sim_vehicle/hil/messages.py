@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from sim_vehicle.airframe import MOST_ROTORS
-from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.estimator.samples import CaptureSample, FlowSample, RangeSample
 from sim_vehicle.geography import Place
-from sim_vehicle.quantities import Quaternion, Vector3
+from sim_vehicle.quantities import Vector3
 
 MOTORS_STOPPED = (0.0,) * MOST_ROTORS
 
@@ -44,18 +44,7 @@ class HilGps:
     """One standard deviation, horizontal and vertical."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionCapture:
-    """What cameras around the room see; PX4 takes it as external vision, and only if EKF2_EV_CTRL says so."""
-
-    time_us: int
-    position_ned_m: Vector3
-    attitude_wxyz: Quaternion
-    position_variance_m2: float
-    attitude_variance_rad2: float
-
-
-ToPx4: TypeAlias = HilSensor | HilGps | MotionCapture | FlowSample | RangeSample
+ToPx4: TypeAlias = HilSensor | HilGps | CaptureSample | FlowSample | RangeSample
 
 
 @dataclass(frozen=True, slots=True)

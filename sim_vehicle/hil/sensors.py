@@ -1,15 +1,13 @@
-"""Sensors beside the inertial one, from the body's true state: magnetometer, barometer, GPS and motion capture."""
+"""Sensors beside the inertial one, from the body's true state: magnetometer, barometer and GPS."""
 
 import math
 import random
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.airframes import aiding
 from sim_vehicle.estimator.estimate import to_ned
 from sim_vehicle.geography import HOME, Origin, Place
-from sim_vehicle.hil.messages import Air, HilGps, MotionCapture
-from sim_vehicle.physics.rotation import turn
-from sim_vehicle.quantities import Floats, Quaternion, Vector3
+from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.quantities import Quaternion, Vector3
 
 # Inside the five years of WMM2025; fixed, so that the same flight has the same field.
 FIELD_YEAR = 2026.0
@@ -103,30 +101,6 @@ class Gps:
             velocity_ned_m_s=_sum(velocity_ned_m_s, self._velocity.next()),
             accuracy_m=self._accuracy_m,
         )
-
-
-class Cameras:
-    """A motion-capture system: position and attitude, with errors that are new in every frame."""
-
-    def __init__(self, spec: aiding.MotionCapture, rng: random.Random) -> None:
-        self._spec, self._rng = spec, rng
-
-    def sample(self, time_us: int, body: Floats) -> MotionCapture:
-        """Of the true state (13,)."""
-        spec, seen = self._spec, body[:10].copy()
-        turn(body, *self._error(spec.noise_rad), seen)
-        north, east, down, *_, w, x, y, z = seen.tolist()
-        return MotionCapture(
-            time_us=time_us,
-            position_ned_m=_sum((north, east, down), self._error(spec.noise_m)),
-            attitude_wxyz=(w, x, y, z),
-            position_variance_m2=spec.noise_m**2,
-            attitude_variance_rad2=spec.noise_rad**2,
-        )
-
-    def _error(self, deviation: float) -> Vector3:
-        gauss = self._rng.gauss
-        return gauss(0, deviation), gauss(0, deviation), gauss(0, deviation)
 
 
 def to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:

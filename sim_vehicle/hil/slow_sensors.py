@@ -33,11 +33,12 @@ class SlowSensors:
         self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
         self.air: Air | None = None
         self.gps: HilGps | None = None
-        self.gps_is_blocked = False
-        """No fix while it is: the receiver goes on without one."""
 
-    def update(self, now_us: int, body: Floats) -> None:
-        """Renew what is due; ``body`` (13,): true position and velocity NED, attitude (w, x, y, z), rates, SI units."""
+    def update(self, now_us: int, body: Floats, gps_is_blocked: bool) -> None:
+        """Renew what is due; ``body`` (13,): true position and velocity NED, attitude (w, x, y, z), rates, SI units.
+
+        ``gps_is_blocked``: the receiver goes on without a fix.
+        """
         due_us = self._due_us
         north, east, down, v_north, v_east, v_down, w, x, y, z = body[:10].tolist()
         if now_us >= due_us[0]:
@@ -48,7 +49,7 @@ class SlowSensors:
             self.air = air_at(self._altitude_m - down, self._rng.gauss(0, BAROMETER_NOISE_PA))
         if now_us >= due_us[3]:
             due_us[3] = NEVER_US
-            self.gps = None if self.gps_is_blocked else self._fix
+            self.gps = None if gps_is_blocked else self._fix
         if now_us >= due_us[2]:
             due_us[2], due_us[3] = now_us + GPS_PERIOD_US, now_us + GPS_DELAY_US
             self._fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))

@@ -4,7 +4,7 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe, Imu
-from sim_vehicle.estimator.sensors import DownwardSensors
+from sim_vehicle.estimator.sensors import CaptureSensor, downward_sensors
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil import sensors
 from sim_vehicle.hil.messages import HilSensor, ToPx4
@@ -47,10 +47,9 @@ class HilVehicle:
         self._magnetometer = sensors.Magnetometer(rng)
         self._rng, self._origin = rng, Origin()
         self._gps = sensors.Gps(airframe, rng, self._origin)
-        self._cameras = sensors.Cameras(airframe.sensors.motion_capture, rng)
-        self._cameras_period_us = round(1e6 / airframe.sensors.motion_capture.rate_hz)
         self.interval_us = self._plant.interval_us
-        self._downward = DownwardSensors(airframe.sensors, self.interval_us, random.Random(~seed))
+        cameras = CaptureSensor(airframe.sensors.motion_capture, self.interval_us, rng)
+        self._aids = cameras, *downward_sensors(airframe.sensors, self.interval_us, random.Random(~seed))
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
         self.truth = self._plant.truth
@@ -65,9 +64,9 @@ class HilVehicle:
         messages: list[ToPx4] = []
         if self._is_due(sensors.GPS_PERIOD_US) and not self._plant.faults.gps_is_lost(now_us / 1e6):
             messages.append(self._gps.sample(now_us, (px, py, pz), (vx, vy, vz)))
-        if self._is_due(self._cameras_period_us):
-            messages.append(self._cameras.sample(now_us, self._body))
-        messages += self._downward.observe(now_us, self._body, self._plant.around.flat_faces)
+        faces = self._plant.around.flat_faces
+        seen = (aid.observe(now_us, self._body, faces) for aid in self._aids)
+        messages += [sample for sample in seen if sample is not None]
         field, air = None, None
         if self._is_due(sensors.MAGNETOMETER_PERIOD_US):
             field = self._magnetometer.sample((qw, qx, qy, qz))

@@ -41,8 +41,8 @@ class Decoder:
         self._rest = b""
         self.sources: set[tuple[int, int]] = set()
         """System and component of everybody who was heard here."""
-        self.foreign: list[ForeignPacket] | None = None
-        """Where set: packets that are not for this vehicle alone, for other links to pass on."""
+        self.foreign: list[ForeignPacket] = []
+        """Of the last push: packets that are not for this vehicle alone, for other links to pass on."""
 
     def push(self, data: bytes) -> list[dialect.MAVLink_message]:
         """The messages completed by ``data``, in order; what is not read here or is meant for others is dropped.
@@ -50,6 +50,7 @@ class Decoder:
         A packet with a wrong checksum is skipped by one byte only, and an incomplete one holds up nothing that follows:
         its start may have been noise.
         """
+        self.foreign = []
         if not data:
             return []
         buffer = self._rest + data if self._rest else data
@@ -88,23 +89,15 @@ class Decoder:
 
     def _hear(self, packet: dialect.MAVLink_message, raw: bytes) -> None:
         self.sources.add((packet.get_srcSystem(), packet.get_srcComponent()))
-        if self.foreign is None:
-            return
-        target = _target(packet) if _is_addressed(packet) else (EVERY_ID, EVERY_ID)
+        target = _target(packet)
         if target != self._us:
             self.foreign.append(ForeignPacket(raw, *target))
 
     def _is_for_us(self, packet: dialect.MAVLink_message) -> bool:
-        if packet.get_msgId() in _READ_BY_ALL or not _is_addressed(packet):
-            return True
-        return self._us.is_addressed(*_target(packet))
-
-
-def _is_addressed(packet: dialect.MAVLink_message) -> bool:
-    return hasattr(packet, "target_system") or packet.get_msgId() == _MANUAL_CONTROL_ID
+        return packet.get_msgId() in _READ_BY_ALL or self._us.is_addressed(*_target(packet))
 
 
 def _target(packet: dialect.MAVLink_message) -> tuple[int, int]:
-    """Whom it addresses; a message without a component is for all of them."""
-    system = packet.target if packet.get_msgId() == _MANUAL_CONTROL_ID else packet.target_system
-    return system, getattr(packet, "target_component", EVERY_ID)
+    """Whom it addresses; a message without a system is for everybody, one without a component for all of them."""
+    system = "target" if packet.get_msgId() == _MANUAL_CONTROL_ID else "target_system"
+    return getattr(packet, system, EVERY_ID), getattr(packet, "target_component", EVERY_ID)

@@ -94,7 +94,7 @@ def heartbeat(state: Telemetry) -> Message:
     return dialect.MAVLink_heartbeat_message(
         int(state.autopilot.parameters["MAV_TYPE"]),
         dialect.MAV_AUTOPILOT_PX4,
-        base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
+        base_mode(mode, autopilot.arming.armed),
         NUMBERS[mode].custom_mode,
         autopilot.commander.system_status,
         3,
@@ -105,8 +105,8 @@ def highres_imu(state: Telemetry) -> Message:
     sample, (field_is_new, air_is_new) = state.sample, state.renewed
     inertial = (*sample.specific_force_frd_m_s2, *sample.angular_velocity_frd_rad_s)
     fields = INERTIAL_FIELDS | (MAGNETIC_FIELDS if field_is_new else 0)
-    fields |= AIR_FIELDS if air_is_new and state.air is not None else 0
-    slow = (*state.magnetic_field_frd_gauss, *air_fields(state.air))
+    fields |= AIR_FIELDS if air_is_new and state.slow.air is not None else 0
+    slow = (*state.slow.magnetic_field_frd_gauss, *air_fields(state.slow.air))
     return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(sample.time_boot_us, *inertial, *slow, fields, 0)
 
 
@@ -159,11 +159,9 @@ def extended_sys_state(state: Telemetry) -> Message:
 
 
 def vibration(state: Telemetry) -> Message:
-    metrics = state.vibration
+    """What was clipped alone."""
     clipped = sum(state.sample.clipping_counts)
-    return dialect.MAVLink_vibration_message(
-        state.sample.time_boot_us, 0.0, metrics.gyroscope_rad_s, metrics.accelerometer_m_s2, clipped, 0, 0
-    )
+    return dialect.MAVLink_vibration_message(state.sample.time_boot_us, 0.0, 0.0, 0.0, clipped, 0, 0)
 
 
 def timesync(state: Telemetry) -> Message:

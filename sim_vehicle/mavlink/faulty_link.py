@@ -7,7 +7,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import FaultError
 from sim_vehicle.faults.spec import ClockJump, Fault, ImuDropout, WireFault
-from sim_vehicle.faults.wire import MAVLINK_2, SIGNED, Wire, split
+from sim_vehicle.faults.wire import MAVLINK_2, SIGNED, Wire, packet_size, split
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.decode import ForeignPacket
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.services.service import Board
@@ -56,10 +57,10 @@ class FaultyLink(Link):
         now_s = self.now_us / 1e6
         self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
 
-    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
+    def receive(self) -> list[ForeignPacket]:
         """Act on what has arrived: bytes that were pushed do when the wire lets them."""
         self._waiting = b"".join(self._inbound.carry(split(self._waiting), self.now_us))
-        return super().receive(collects_foreign)
+        return super().receive()
 
     def take(self) -> tuple[bytes, ...]:
         """The packets that arrive at the other end now, in order."""
@@ -87,16 +88,13 @@ def _as_wire_fault(fault: Fault, direction: str) -> WireFault | None:
 
 def restamped(frame: bytes, offset_us: int) -> bytes:
     """The packet with every time stamp of the vehicle's clock moved; as it was if it has none, is signed or damaged."""
-    if len(frame) < 3 or (frame[0] == MAVLINK_2 and frame[2] & SIGNED):
+    if packet_size(frame, 0) != len(frame) or (frame[0] == MAVLINK_2 and frame[2] & SIGNED):
         return frame
-    try:
-        message = dialect.MAVLink(None).decode(bytearray(frame))
-    except dialect.MAVError:
-        return frame
-    if not _move(message, offset_us):
+    message = framing.read(frame)
+    if message is None or not _move(message, offset_us):
         return frame
     link = dialect.MAVLink(None, message.get_srcSystem(), message.get_srcComponent())
-    link.seq = message.get_seq()
+    link.seq = frame[4] if frame[0] == MAVLINK_2 else frame[2]
     packed: bytes = message.pack(link, force_mavlink1=frame[0] != MAVLINK_2)
     return packed
 

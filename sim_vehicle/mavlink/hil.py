@@ -10,8 +10,8 @@ from typing import Any
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import Identity
-from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, MotionCapture, ToPx4
+from sim_vehicle.estimator.samples import CaptureSample, FlowSample, RangeSample
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, HilGps, HilSensor, ToPx4
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.streams import aiding
@@ -68,7 +68,7 @@ def _gps(fix: HilGps) -> Message:
     )
 
 
-def _motion_capture(seen: MotionCapture) -> Message:
+def _motion_capture(seen: CaptureSample) -> Message:
     return dialect.MAVLink_odometry_message(
         seen.time_us,
         dialect.MAV_FRAME_LOCAL_NED,
@@ -76,7 +76,7 @@ def _motion_capture(seen: MotionCapture) -> Message:
         *seen.position_ned_m,
         list(seen.attitude_wxyz),
         *_UNKNOWN_VELOCITY_AND_RATES,
-        encode.diagonal_covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
+        encode.diagonal_covariance(seen.noise_m**2, seen.noise_rad**2),
         encode.diagonal_covariance(math.nan, math.nan),
         0,
         # As MOCAP it would go to a topic that EKF2 does not read.
@@ -88,7 +88,7 @@ def _motion_capture(seen: MotionCapture) -> Message:
 _FILLED: dict[type[Any], Callable[[Any], Message]] = {
     HilSensor: _sensor,
     HilGps: _gps,
-    MotionCapture: _motion_capture,
+    CaptureSample: _motion_capture,
     FlowSample: aiding.hil_optical_flow,
     RangeSample: aiding.distance_looking_down,
 }

@@ -11,6 +11,7 @@ from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.services.command_service import CommandService
 from sim_vehicle.mavlink.services.file_service import FileService
 from sim_vehicle.mavlink.services.mission_service import MissionService
+from sim_vehicle.mavlink.services.mission_transfer import MissionTransfer
 from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import Board, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
@@ -25,6 +26,7 @@ SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
     SetpointService,
     ParameterService,
     MissionService,
+    MissionTransfer,
     FileService,
 )
 
@@ -42,15 +44,13 @@ class Link:
         self._encoder = Encoder(board.identity)
         self.streams = Streams(board.telemetry, board.topics, self._encoder, self.kind, seed)
         self._texts = TextLink()
-        services = tuple(service(self, board) for service in SERVICES)
-        # Those that have nothing to do with time are not called in every interval.
-        self._services = [service for service in services if type(service).update is not Service.update]
+        self._services = tuple(service(self, board) for service in SERVICES)
         self.handlers: dict[int, Handler] = {
             HEARTBEAT_ID: self._hear_heartbeat,
             4: self._answer_ping,
             111: self._answer_timesync,
         }
-        for service in services:
+        for service in self._services:
             self.handlers.update(service.handlers)
         self._decoder = Decoder(board.identity, self.handlers, self._signing)
 
@@ -80,17 +80,16 @@ class Link:
             if (ack.target_system, ack.target_component) in self._decoder.sources:
                 self.send(encode.command_ack(ack))
 
-    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
-        """Act on the packets that the waiting bytes complete; those for others are returned, where asked for."""
+    def receive(self) -> list[ForeignPacket]:
+        """Act on the packets that the waiting bytes complete; return those for others."""
         if not self._waiting:
             return []
         data, self._waiting = self._waiting, b""
         decoder, parameters = self._decoder, self._board.autopilot.parameters
-        decoder.foreign = [] if collects_foreign else None
         decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == OPTIONAL
         for packet in decoder.push(data):
             self.handlers[packet.get_msgId()](packet)
-        return decoder.foreign or []
+        return decoder.foreign
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
         """Pass on what came over other links, if somebody here may want it."""

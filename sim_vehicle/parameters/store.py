@@ -89,8 +89,6 @@ class Parameters(dict[str, float]):
         own = own_defaults or {}
         self.defaults = {name: row.typed(own.get(name, row.default)) for name, row in self.definitions.items()}
         self._stored = dict(self.defaults)
-        self.changes = 0
-        """Grows with every change of a value that counts."""
         self.sets = 0
         """Grows with every change of a stored value."""
         self._last_set: dict[str, int] = {}
@@ -109,10 +107,7 @@ class Parameters(dict[str, float]):
             self._last_set[name] = self.sets
         self._stored[name] = stored
         # A default of the airframe may lie outside PX4's range, which is meant for PX4's own control.
-        counts = stored if stored == self.defaults[name] else row.limited(stored)
-        if counts != self[name]:
-            self[name] = counts
-            self.changes += 1
+        self[name] = stored if stored == self.defaults[name] else row.limited(stored)
 
     def set_after(self, sets: int) -> list[str]:
         """The names whose stored value has changed since `sets` was that number."""

@@ -2,7 +2,9 @@
 
 import math
 
-from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control, rate_control
+import numpy as np
+
+from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control, track
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
 from sim_vehicle.physics.estimate import update_estimate, update_slope
 from sim_vehicle.physics.imu import add_raw_sample
@@ -23,7 +25,7 @@ from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.physics.touching.contact import relax_arms, settle_arms
 from sim_vehicle.physics.touching.hits import close_old_hit, note_contact
-from sim_vehicle.physics.touching.proximity import find_close, find_near, wake_faces
+from sim_vehicle.physics.touching.proximity import find_close, find_near
 from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_VELOCITY
 
@@ -78,7 +80,7 @@ def advance_interval(
     state.rate_sum[:] = 0.0
     state.clipped_off_m_s[:] = 0.0
     interval_s = 1e-6 * constants.raw_per_interval * constants.raw_interval_us
-    awake = wake_faces(state.body, interval_s, constants, faces, near, scratch)
+    touches = find_near(state.body, interval_s, constants, faces, near, scratch)
     spun = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
     if motors in (MOTORS_OFF, MOTORS_IDLE):
         rest_loops(state)
@@ -90,7 +92,7 @@ def advance_interval(
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]
             scratch.rates_before[i] = state.body[10 + i]
-        move_body(state, awake, constants, disturbance, faces, moving, behind, near, forces, scratch)
+        move_body(state, touches, constants, disturbance, faces, moving, behind, near, forces, scratch)
         add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
@@ -123,7 +125,7 @@ def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> N
                 for column in range(3):
                     state.attitude_setpoint[row, column] = asked.attitude[row, column]
         if asked.level == ASKED_RATES:
-            rate_control(state, constants, asked.rates_frd_rad_s)
+            track(state, constants, np.zeros(3), asked.rates_frd_rad_s)
         else:
             attitude_control(state, constants, asked.yaw[2])
         allocate_motors(state, constants)
@@ -148,7 +150,7 @@ def spin_motors(state: PlantState, share: float, constants: Constants, disturban
 @inlined
 def move_body(
     state: PlantState,
-    awake: bool,
+    touches: bool,
     constants: Constants,
     disturbance: Disturbance,
     faces: Floats,
@@ -161,7 +163,6 @@ def move_body(
     """Move the body through one raw interval, in fine steps while something stiff may touch."""
     body = state.body
     raw_s = 1e-6 * constants.raw_interval_us
-    touches = awake and find_near(body, constants, faces, near, scratch)
     steps, travel_m = 1, 0.0
     if touches:
         matrix_from_quaternion(body, scratch.rotation)

@@ -213,18 +213,6 @@ def test_whatever_is_not_refused_stands_and_hovers(count: int) -> None:
     assert flown > count // 20
 
 
-def test_feet_that_reach_further_than_the_guards_stand_on_the_ground() -> None:
-    # Given feet below the reach of a small vehicle's guards
-    small = {"hub_radius_m": 0.02, "arm_length_m": 0.06, "guard_radius_m": 0.03, "foot_depth_m": 0.15}
-    airframe = Airframe.model_validate(
-        with_base({"based_on": "foldable", "geometry": small, "arms": {"tip_mass_kg": 0.02}})
-    )
-    plant = Plant(airframe, Scene(), 1)
-    for _ in range(250):
-        plant.step(None, armed=False)
-        assert plant.state.body[2] == pytest.approx(-0.15, abs=0.003)
-
-
 ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs" / "reference" / "simulated-vehicle.md").read_text()
 

@@ -2,7 +2,9 @@
 
 import math
 import socket
-from collections.abc import Callable, Iterable
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -25,6 +27,20 @@ def heard_until(connection: socket.socket, wanted: set[str]) -> set[str]:
     while not wanted <= heard:
         heard |= {message.get_type() for message in parser.parse_buffer(connection.recv(65_536)) or []}
     return heard
+
+
+@contextmanager
+def in_a_thread(serves: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """It serves until the block ends."""
+    stop = threading.Event()
+    thread = threading.Thread(target=serves, args=arguments, kwargs={"stop": stop.is_set})
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(5.0)
+        assert not thread.is_alive()
 
 
 class End:

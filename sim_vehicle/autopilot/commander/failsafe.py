@@ -6,6 +6,7 @@ Source: PX4's commander/failsafe/framework.cpp. What sets one off stands in `fai
 from dataclasses import dataclass
 
 from sim_vehicle.autopilot.commander.failsafe_table import (
+    MODE_OF,
     Action,
     Clears,
     FailsafeSituation,
@@ -21,15 +22,6 @@ from sim_vehicle.parameters.store import Parameters
 # Below this COM_FAIL_ACT_T there is no delay, and then sticks alone do not take over either.
 _NO_DELAY_S = 0.1
 
-MODE_OF: dict[Action, Mode] = {
-    Action.FALL_BACK_TO_POSITION: Mode.POSCTL,
-    Action.FALL_BACK_TO_ALTITUDE: Mode.ALTCTL,
-    Action.FALL_BACK_TO_STABILIZED: Mode.STABILIZED,
-    Action.HOLD: Mode.LOITER,
-    Action.RETURN: Mode.RETURN,
-    Action.LAND: Mode.LAND,
-    Action.DESCEND: Mode.DESCEND,
-}
 # If its mode cannot run, an action gives way to the next; the last needs nothing.
 _LADDER = tuple(MODE_OF)
 # Modes flown by sticks need no taking over.
@@ -43,10 +35,10 @@ _NOT_DELAYED = (Action.NONE, Action.WARN, Action.HOLD)
 class _Active:
     """An action that was set off and has not ended."""
 
-    response: Response
+    action: Action
+    clears: Clears
     takeover: Takeover
     failing: bool = True
-    checked: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +69,6 @@ class Failsafe:
         self._intended: Mode | None = None
         self._delay_us = 0
         self._announce = False
-        self._settled: tuple[FailsafeSituation, int, Decision] | None = None
-        """Situation, changes of parameters, and what they came to, while nothing acts and no delay runs."""
 
     @property
     def acts(self) -> bool:
@@ -86,11 +76,7 @@ class Failsafe:
         return self.action > Action.WARN
 
     def update(self, now_us: int, now: FailsafeSituation, parameters: Parameters) -> Decision:
-        """Judge the situation. One that stays as it is, and calls for nothing, is judged once."""
-        settled = self._settled
-        if settled is not None and settled[0] == now and settled[1] == parameters.changes:
-            self._last_us = now_us
-            return settled[2]
+        """Judge the situation."""
         elapsed_us = 0 if self._last_us is None else now_us - self._last_us
         self._last_us = now_us
         if now.armed is not self._armed:
@@ -106,10 +92,7 @@ class Failsafe:
         decision, delayed, took_over = self._select(now, parameters, changed)
         says = self._announcement(decision.action, delayed)
         self.action, self.took_over, self._intended = decision.action, took_over, decision.intended
-        decision = Decision(decision.action, decision.intended, says)
-        waits = self._active or took_over or self._delay_us > 0
-        self._settled = None if waits or says else (now, parameters.changes, decision)
-        return decision
+        return Decision(decision.action, decision.intended, says)
 
     def _announcement(self, action: Action, delayed: Action) -> tuple[str, ...]:
         tells = action > self.action or (action is not Action.NONE and self._announce)
@@ -123,24 +106,22 @@ class Failsafe:
     # --- which actions are in force ------------------------------------------------------------------------
 
     def _check(self, now: FailsafeSituation, parameters: Parameters) -> None:
-        for trigger, response in responses_now(now, parameters):
-            self._set_off(trigger, response, parameters)
+        found = dict(responses_now(now, parameters))
         fallback = mode_fallback(now, parameters, now.intended)
         if fallback is not Action.NONE:
-            self._set_off(FailsafeTrigger.MODE_CANNOT_RUN, Response(fallback, takeover=Takeover.ALWAYS), parameters)
+            found[FailsafeTrigger.MODE_CANNOT_RUN] = Response(fallback, takeover=Takeover.ALWAYS)
+        for trigger, response in found.items():
+            self._set_off(trigger, response, parameters)
         for trigger, active in list(self._active.items()):
-            if not active.checked:
-                active.failing = False
-                if active.response.clears is Clears.AT_ONCE:
-                    del self._active[trigger]
-            active.checked = False
+            active.failing = trigger in found
+            if not active.failing and active.clears is Clears.AT_ONCE:
+                del self._active[trigger]
 
     def _set_off(self, trigger: FailsafeTrigger, response: Response, parameters: Parameters) -> None:
         active = self._active.get(trigger)
         if active is not None:
             # The action may change meanwhile; how it ends and who may end it stays.
-            kept = Response(response.action, active.response.clears, active.response.takeover)
-            active.response, active.failing, active.checked = kept, True, True
+            active.action = response.action
             return
         takeover = response.takeover
         if takeover is Takeover.AFTER_DELAY:
@@ -149,14 +130,14 @@ class Failsafe:
                 takeover = Takeover.ALWAYS
                 if response.action is not Action.WARN and self._delay_us == 0:
                     self._delay_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
-        self._active[trigger] = _Active(response, takeover)
+        self._active[trigger] = _Active(response.action, response.clears, takeover)
         self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:
             self.took_over = False
 
     def _forget_kept(self) -> None:
         for trigger, active in list(self._active.items()):
-            if not active.failing and active.response.clears is Clears.MODE_CHANGE_OR_DISARM:
+            if not active.failing and active.clears is Clears.MODE_CHANGE_OR_DISARM:
                 del self._active[trigger]
 
     # --- which of them flies -------------------------------------------------------------------------------
@@ -165,7 +146,7 @@ class Failsafe:
         """The decision, the action that waits behind it, and whether the pilot has it."""
         if not now.armed or now.intended is Mode.TERMINATION:
             return Decision(Action.NONE, now.intended), Action.NONE, False
-        action = max((active.response.action for active in self._active.values()), default=Action.NONE)
+        action = max((active.action for active in self._active.values()), default=Action.NONE)
         takeover = max((active.takeover for active in self._active.values()), default=Takeover.ALWAYS)
         delayed, intended, took_over = Action.NONE, now.intended, False
         may_wait = takeover <= Takeover.BY_MODE_SWITCH and action not in _NOT_DELAYED

@@ -143,15 +143,25 @@ ROWS: tuple[FailsafeRow, ...] = (
     FailsafeRow(FailsafeTrigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
 )
 
-OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
-    0: (Action.FALL_BACK_TO_POSITION, Mode.POSCTL),
-    1: (Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL),
-    2: (Action.FALL_BACK_TO_STABILIZED, Mode.STABILIZED),
-    3: (Action.RETURN, Mode.RETURN),
-    4: (Action.LAND, Mode.LAND),
-    5: (Action.HOLD, Mode.LOITER),
+MODE_OF: dict[Action, Mode] = {
+    Action.FALL_BACK_TO_POSITION: Mode.POSCTL,
+    Action.FALL_BACK_TO_ALTITUDE: Mode.ALTCTL,
+    Action.FALL_BACK_TO_STABILIZED: Mode.STABILIZED,
+    Action.HOLD: Mode.LOITER,
+    Action.RETURN: Mode.RETURN,
+    Action.LAND: Mode.LAND,
+    Action.DESCEND: Mode.DESCEND,
 }
-"""COM_OBL_RC_ACT: what is done and which mode that means."""
+
+OFFBOARD_LOSS: dict[int, Action] = {
+    0: Action.FALL_BACK_TO_POSITION,
+    1: Action.FALL_BACK_TO_ALTITUDE,
+    2: Action.FALL_BACK_TO_STABILIZED,
+    3: Action.RETURN,
+    4: Action.LAND,
+    5: Action.HOLD,
+}
+"""COM_OBL_RC_ACT: what is done."""
 
 
 def responses_now(now: FailsafeSituation, parameters: Parameters) -> list[tuple[FailsafeTrigger, Response]]:
@@ -164,7 +174,8 @@ def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode
     """What becomes of a mode that cannot run: offboard's own loss first, then sticks, then the return."""
     action, mode = Action.NONE, intended
     if mode is Mode.OFFBOARD and mode in now.cannot_run:
-        action, mode = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
+        action = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
+        mode = MODE_OF[action]
     if mode is Mode.POSCTL and mode in now.cannot_run:
         action, mode = Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL
     return Action.RETURN if mode in now.cannot_run else action

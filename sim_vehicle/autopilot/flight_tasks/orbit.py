@@ -55,11 +55,6 @@ class Orbit:
             self._approach(view)
         return True
 
-    @property
-    def status(self) -> tuple[float, Vector3]:
-        """Radius, positive for clockwise, and centre, as they are flown."""
-        return math.copysign(self._radius_m, self._speed_m_s), self._centre_ned_m
-
     def demand(self, view: View, step_s: float) -> TrajectorySetpoint:
         """The next setpoint: straight to the circle, then along it."""
         if self._approaches and self._is_on_circle(view):

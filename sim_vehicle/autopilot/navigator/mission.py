@@ -234,8 +234,6 @@ def problem_of(items: Sequence[StoredItem], origin: Origin, fence: Geofence, vie
     home, has_place = view.home_ned_m, False
     for number, item in enumerate(items, start=1):
         if item.command not in kinds.WITH_POSITION:
-            # To its check of the takeoff, PX4 counts an actuator, a gripper and a winch among the places, too.
-            has_place = has_place or item.command in (kinds.ARM_DISARM, kinds.RETURN_TO_LAUNCH, 187, 211, 42600)
             continue
         place = place_of(item, origin, home)
         if item.command == kinds.TAKEOFF and place[2] >= home[2]:

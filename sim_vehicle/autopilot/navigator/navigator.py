@@ -263,11 +263,6 @@ class Navigator:
         target = self.target
         return None if target is None or target.kind is Kind.IDLE else target.position_ned_m
 
-    @property
-    def orbit_status(self) -> tuple[float, Vector3] | None:
-        """Radius, positive for clockwise, and centre; None while no orbit is flown."""
-        return self.orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
-
 
 _FENCE_HOLDS = 2
 _BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, Mode.LAND)

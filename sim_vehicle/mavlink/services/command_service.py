@@ -26,8 +26,6 @@ REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, 410: 242, 528: 264, 525: 261}
 _MESSAGE_INTERVAL_ID = 244
 
 _GREATEST_INT32 = 2**31 - 1
-# The same as a float with its two neighbours, and the upper half of a NaN: places that were sent in the wrong message.
-_LEAST_MISTAKEN, _GREATEST_MISTAKEN, _NAN_AS_INT = 2**31 - 128, 2**31 + 256, 0x7FF80000
 
 
 class CommandService(Service):
@@ -38,8 +36,8 @@ class CommandService(Service):
         self._board = board
         self.handlers = {
             11: self._set_mode,
-            75: lambda packet: self._take(command_from_int(packet), packet.x == packet.y == _NAN_AS_INT),
-            76: lambda packet: self._take(command_from_long(packet), _is_mistaken(packet)),
+            75: lambda packet: self._take(command_from_int(packet)),
+            76: lambda packet: self._take(command_from_long(packet)),
         }
 
     def _set_mode(self, packet: dialect.MAVLink_set_mode_message) -> None:
@@ -48,10 +46,10 @@ class CommandService(Service):
         source, target = (packet.get_srcSystem(), packet.get_srcComponent()), (packet.target_system, EVERY_ID)
         self._board.autopilot.command(Command(*source, *target, commands.DO_SET_MODE, packet.base_mode, main, sub))
 
-    def _take(self, command: Command, is_mistaken: bool) -> None:
-        if not is_mistaken and not self._is_for_us(command):
+    def _take(self, command: Command) -> None:
+        if not self._is_for_us(command):
             return
-        result = Result.DENIED if is_mistaken else self._received(command)
+        result = self._received(command)
         if result is not None:
             self._link.send(encode.command_ack(commands.answer(command, result)))
         if result is None or command.command == commands.DO_SET_MODE:
@@ -92,10 +90,6 @@ class CommandService(Service):
         told = dialect.MAVLink_message_interval_message(number & 0xFFFF, self._link.streams.interval_us(number))
         self._link.send(told)
         return Result.ACCEPTED
-
-
-def _is_mistaken(packet: dialect.MAVLink_command_long_message) -> bool:
-    return all(_LEAST_MISTAKEN <= value <= _GREATEST_MISTAKEN for value in (packet.param5, packet.param6))
 
 
 def command_from_long(packet: dialect.MAVLink_command_long_message) -> Command:

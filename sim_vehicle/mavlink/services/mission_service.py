@@ -1,12 +1,11 @@
-"""The mission protocol on a link, and the mission's progress.
+"""How far the mission is, told on a link.
 
-Source of the progress: PX4's MavlinkMissionManager::send and update_mission_state.
+Source: PX4's MavlinkMissionManager::send and update_mission_state.
 """
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.services.mission_transfer import MESSAGES, MissionTransfer
 from sim_vehicle.mavlink.services.service import Board, Channel, Service
 
 # MISSION_CURRENT is repeated once a second, and MISSION_ITEM_REACHED with it as often as this.
@@ -17,30 +16,17 @@ _NO_MISSION = 0xFFFF
 
 
 class MissionService(Service):
-    """One link's transfer of the autopilot's lists, and how far the mission is.
-
-    MISSION_CURRENT and MISSION_ITEM_REACHED come at every change, and again for whoever missed it.
-    """
+    """MISSION_CURRENT and MISSION_ITEM_REACHED come at every change, and again for whoever missed it."""
 
     def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._store = store = board.autopilot.missions
-        self._transfer = MissionTransfer(store, link)
         self._sent_us = 0
         self._current, self._reached = store.current, store.progress.reached
         self._repeats = 0
         self._state = 0
-        self.handlers = dict.fromkeys(MESSAGES, self._transfer.receive)
 
     def update(self, now_us: int) -> None:
-        """Repeats, time-outs, and what the mission has come to."""
-        self._report(now_us)
-        self._transfer.update(now_us)
-
-    def close(self) -> None:
-        self._transfer.end()
-
-    def _report(self, now_us: int) -> None:
         """What is due now, nearly always nothing."""
         store, progress = self._store, self._store.progress
         is_due = now_us - self._sent_us >= CURRENT_PERIOD_US

@@ -11,10 +11,10 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol.mission_items import MissionType, StoredItem
-from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
+from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS
 from sim_vehicle.mavlink.services import mission_wire as wire
 from sim_vehicle.mavlink.services.mission_wire import MissionResult
-from sim_vehicle.mavlink.services.service import Channel
+from sim_vehicle.mavlink.services.service import Board, Channel, Service
 
 # MAVLINK_MISSION_RETRY_TIMEOUT_DEFAULT and MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT.
 RETRY_US = 250_000
@@ -38,13 +38,13 @@ class TransferState(Enum):
     """A list goes out: the peer asks for each item."""
 
 
-class MissionTransfer:
+class MissionTransfer(Service):
     """Messages and the time in; answers out. The lists themselves are the store's."""
 
-    def __init__(self, store: MissionStore, link: Channel) -> None:
-        """``link`` takes the answers and has the time."""
+    def __init__(self, link: Channel, board: Board) -> None:
+        self.handlers = dict.fromkeys(MESSAGES, self.receive)
         self.state = TransferState.IDLE
-        self._store, self._link, self._send = store, link, link.send
+        self._store, self._link, self._send = board.autopilot.missions, link, link.send
         self._peer = _NOBODY
         self._type: int = MissionType.MISSION
         self._next = 0
@@ -70,6 +70,9 @@ class MissionTransfer:
             self._ask_for_next()
         elif now_us - self._sent_us > RETRY_US and self._next == 0:
             self._send_count()
+
+    def close(self) -> None:
+        self.end()
 
     # --- download ----------------------------------------------------------------------------------------------
 

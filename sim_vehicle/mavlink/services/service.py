@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol, TypeAlias
 
 from sim_vehicle.autopilot.autopilot import Autopilot
@@ -42,7 +43,7 @@ class Channel(Protocol):
 class Service:
     """One protocol on one link, each message answered at once. What all links share is the autopilot's."""
 
-    handlers: Mapping[int, Handler]
+    handlers: Mapping[int, Handler] = MappingProxyType({})
     """What to do with a packet, by its message's id; called in the order of arrival."""
 
     def update(self, now_us: int) -> None:

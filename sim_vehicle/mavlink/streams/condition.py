@@ -35,6 +35,7 @@ _NO_STICKS = 4
 _LOAD_PER_MILLE = 100
 
 _UNKNOWN_16 = 0xFFFF
+_UNKNOWN_CURRENT = -1
 _UNKNOWN_TEMPERATURE = 0x7FFF
 # PWM of the simulated outputs: off, and from least to greatest.
 PWM_OFF_US, PWM_LEAST_US, PWM_SPAN_US = 900, 1000, 1000
@@ -46,7 +47,7 @@ def sys_status(state: Telemetry) -> Message:
     autopilot, battery = state.autopilot, state.autopilot.battery
     enabled = _PRESENT if state.autopilot.parameters["COM_RC_IN_MODE"] == _NO_STICKS else _PRESENT | _RC_RECEIVER
     health = _WELL | (_PREARM_CHECK if autopilot.commander.checks_pass else 0)
-    if state.gps is None:
+    if state.slow.gps is None:
         health &= ~_GPS
     return dialect.MAVLink_sys_status_message(
         _PRESENT,
@@ -54,7 +55,7 @@ def sys_status(state: Telemetry) -> Message:
         health,
         _LOAD_PER_MILLE,
         _millivolts(battery.voltage_v),
-        round(100 * battery.current_a),
+        _UNKNOWN_CURRENT,
         math.ceil(100 * battery.remaining),
         *_NO_LINK_STATISTICS,
         _EXTENDED_WELL,
@@ -71,8 +72,8 @@ def battery_status(state: Telemetry) -> Message:
         dialect.MAV_BATTERY_TYPE_LIPO,
         _UNKNOWN_TEMPERATURE,
         voltages,
-        round(100 * battery.current_a),
-        int(battery.consumed_mah),
+        _UNKNOWN_CURRENT,
+        0,
         -1,
         round(100 * battery.remaining),
         0,
@@ -98,7 +99,7 @@ def manual_control(state: Telemetry) -> Message:
 
 
 def scaled_pressure(state: Telemetry) -> Message:
-    air = state.air
+    air = state.slow.air
     assert air is not None, "streamed only once there is a sample"
     return dialect.MAVLink_scaled_pressure_message(
         boot_ms(state.sample), air.pressure_hpa, 0.0, round(100 * air.temperature_c)

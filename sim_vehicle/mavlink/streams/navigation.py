@@ -7,7 +7,6 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms, units_of
@@ -37,7 +36,7 @@ def global_position_int(state: Telemetry) -> Message:
 
 
 def gps_raw_int(state: Telemetry) -> Message:
-    fix = state.gps
+    fix = state.slow.gps
     if fix is None or state.autopilot.parameters["SIM_GPS_USED"] < 4:
         satellites = int(state.autopilot.parameters["SIM_GPS_USED"]) if fix is not None else 0
         unknown = (_UNKNOWN_16,) * 4
@@ -85,7 +84,7 @@ def altitude(state: Telemetry) -> Message:
     seen = state.range.distance_m if state.range is not None else None
     return dialect.MAVLink_altitude_message(
         state.published.time_boot_us,
-        state.air.altitude_m if state.air is not None else NAN,
+        state.slow.air.altitude_m if state.slow.air is not None else NAN,
         origin_m + height_m,
         height_m,
         height_m + state.autopilot.navigator.view.home_ned_m[2],
@@ -116,42 +115,6 @@ def estimator_status(state: Telemetry) -> Message:
         NAN,
         math.sqrt(2 * state.position_variance_m2),
         math.sqrt(state.position_variance_m2),
-    )
-
-
-def position_target_global_int(state: Telemetry) -> Message | None:
-    """Where a mode that flies by itself is going; nothing in all others."""
-    autopilot, applied = state.autopilot, state.autopilot.applied
-    target = autopilot.navigator.shown_target_ned_m
-    if target is None or autopilot.detector.landed:
-        return None
-    flown = applied if isinstance(applied, TrajectorySetpoint) else None
-    place = state.autopilot.origin.place_at(target)
-    velocity = flown.velocity_ned_m_s if flown is not None else (None, None, None)
-    return dialect.MAVLink_position_target_global_int_message(
-        boot_ms(state.published),
-        dialect.MAV_FRAME_GLOBAL_INT,
-        0,
-        *units_of(place)[:2],
-        place.altitude_m,
-        *(value or 0.0 for value in velocity),
-        0.0,
-        0.0,
-        0.0,
-        (flown.yaw_rad or 0.0) if flown is not None else 0.0,
-        0.0,
-    )
-
-
-def orbit_execution_status(state: Telemetry) -> Message | None:
-    """The circle that is flown; nothing while there is none."""
-    orbit = state.autopilot.navigator.orbit_status
-    if orbit is None:
-        return None
-    radius_m, centre_ned_m = orbit
-    place = state.autopilot.origin.place_at(centre_ned_m)
-    return dialect.MAVLink_orbit_execution_status_message(
-        state.published.time_boot_us, radius_m, dialect.MAV_FRAME_GLOBAL, *units_of(place)[:2], place.altitude_m
     )
 
 

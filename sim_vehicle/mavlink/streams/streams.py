@@ -5,6 +5,7 @@ mavlink_receiver.cpp (set_message_interval). Asked for 200 Hz, the rule
 sends a 250 Hz topic at 125 Hz; asked for 100 Hz, in gaps of 12 and 8 ms.
 """
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -68,9 +69,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(74, Topic.POSITION, navigation.vfr_hud, Rates(10, 4, 4)),
     StreamKind(36, Topic.SAMPLE, condition.servo_output_raw, Rates(10, 1, 50)),
     StreamKind(24, Topic.GPS, navigation.gps_raw_int, Rates(UNLIMITED, 5, 5)),
-    StreamKind(87, Topic.POSITION, navigation.position_target_global_int, Rates(10, 1, 1)),
     StreamKind(230, Topic.POSITION, navigation.estimator_status, Rates(1, 0.5, 0.5)),
-    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status, Rates(5, 2, 2)),
     StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin, Rates(1, 1, 1)),
     StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position, Rates(0.5, 0.5, 0.5)),
     StreamKind(147, Topic.BATTERY, condition.battery_status, Rates(0.5, 0.5, 0.5)),
@@ -117,7 +116,7 @@ class Stream:
     def set_interval(self, interval_us: int) -> None:
         """Go on with another interval."""
         self.interval_us = interval_us
-        self.due_after_us = self._last_us + interval_us - EARLY_US
+        self.due_after_us = math.inf if interval_us < 0 else self._last_us + interval_us - EARLY_US
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
@@ -161,11 +160,6 @@ class Streams:
         self._by_id = {stream.kind.message_id: stream for stream in streams}
         self._versions = topics.versions
         self._loops = LateLoops(seed)
-        self._run()
-
-    def _run(self) -> None:
-        """Find the streams that run."""
-        self._running = [stream for stream in self._by_id.values() if stream.interval_us >= 0]
 
     def update(self) -> None:
         """Send what is due at the newest sample."""
@@ -173,7 +167,7 @@ class Streams:
         if self._loops.misses_this_one():
             return
         versions = self._versions
-        for stream in self._running:
+        for stream in self._by_id.values():
             if now_us <= stream.due_after_us or stream.seen == versions[stream.topic]:
                 continue
             stream.sent(now_us)
@@ -212,7 +206,6 @@ class Streams:
             stream.set_interval(wanted_us)
         else:
             stream.restart(wanted_us, self._state.sample.time_boot_us)
-        self._run()
         return True
 
     def send_now(self, message_id: int) -> bool:

@@ -2,7 +2,6 @@
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.offboard import STATUS_PERIOD_US
 from sim_vehicle.mavlink.telemetry import Telemetry
 
@@ -25,11 +24,10 @@ class Topic(IntEnum):
     """New once: it does not move."""
     MAGNETIC_FIELD = 10
     STICKS = 11
-    ORBIT = 12
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.AIR, Topic.STICKS, Topic.ORBIT)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.AIR, Topic.STICKS)
 
 
 class Topics:
@@ -47,9 +45,9 @@ class Topics:
         state, commander = self._state, self._state.autopilot.commander
         return (
             (Topic.STICKS, commander.sticks.sticks),
-            (Topic.AIR, state.air),
-            (Topic.MAGNETIC_FIELD, state.magnetic_field_frd_gauss),
-            (Topic.GPS, state.gps),
+            (Topic.AIR, state.slow.air),
+            (Topic.MAGNETIC_FIELD, state.slow.magnetic_field_frd_gauss),
+            (Topic.GPS, state.slow.gps),
             (Topic.BATTERY, commander.battery.version),
             (Topic.FLOW, state.flow),
             (Topic.RANGE, state.range),
@@ -72,8 +70,6 @@ class Topics:
                 versions[topic] += 1
         now_us = state.sample.time_boot_us
         status = (commander.modes.flown, commander.arming.armed, commander.system_status)
-        if status[0] is Mode.ORBIT:
-            versions[Topic.ORBIT] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[Topic.STATUS] += 1

@@ -18,47 +18,31 @@ from sim_vehicle.physics.touching.meeting import (
 from sim_vehicle.quantities import Floats, Ints
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
 
-# Values of `near`, per face: out of reach for this interval, out of reach now, within reach, and so close that
-# guards and hub must be looked at.
-ASLEEP, FAR, NEAR, CLOSE = range(4)
+# Values of `near`, per face: out of reach for this interval, within reach, and so close that guards and hub must be
+# looked at.
+FAR, NEAR, CLOSE = range(3)
 # Values of `behind`, per point and face. A part is past a face whose plane it crossed beside the rectangle. It is
 # inside where it got deep without coming from outside, as a part that slips off an edge may. No spring was compressed,
 # so none may push.
 IN_FRONT, PASSED, INSIDE = range(3)
-# Room for the travel in one raw interval at any speed the vehicle can fly.
-NEAR_MARGIN_M = 0.01
 # Room for what a hit may add to the speed within one interval of the inertial sensor.
-WAKE_MARGIN_M = 0.03
+NEAR_MARGIN_M = 0.03
 
 
 @njit
-def wake_faces(
+def find_near(
     body: Floats, interval_s: float, contact: ContactSprings, faces: Floats, near: Ints, scratch: Scratch
 ) -> bool:
-    """Set the faces that no part can reach in an interval of the inertial sensor ASLEEP; whether any is awake."""
+    """Mark the faces that some part could reach in an interval of the inertial sensor; whether there is any."""
     speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
-    awake = False
+    found = False
     for face in range(near.shape[0]):
         moved = 0.0
         for i in range(3):
             moved += abs(faces[face, FACE_VELOCITY + i])
-        reach_m = contact.reach_m + 2.0 * (speed + 2.0 * moved) * interval_s + WAKE_MARGIN_M
-        near[face] = FAR if _is_within_reach(body, face, reach_m, faces, scratch) else ASLEEP
-        awake = awake or near[face] == FAR
-    return awake
-
-
-@inlined
-def find_near(body: Floats, contact: ContactSprings, faces: Floats, near: Ints, scratch: Scratch) -> bool:
-    """Mark the faces that some part could reach; return whether there is any."""
-    found = False
-    for face in range(near.shape[0]):
-        if near[face] == ASLEEP:
-            continue
-        near[face] = FAR
-        if _is_within_reach(body, face, contact.reach_m + NEAR_MARGIN_M, faces, scratch):
-            near[face] = NEAR
-            found = True
+        reach_m = contact.reach_m + 2.0 * (speed + 2.0 * moved) * interval_s + NEAR_MARGIN_M
+        near[face] = NEAR if _is_within_reach(body, face, reach_m, faces, scratch) else FAR
+        found = found or near[face] == NEAR
     return found
 
 
@@ -83,8 +67,9 @@ def find_close(
     """
     touching = False
     for face in range(near.shape[0]):
-        if near[face] < NEAR:
+        if near[face] == FAR:
             continue
+        near[face] = NEAR
         flat = faces[face, FACE_RADIUS] == 0.0
         for point in range(POINTS if faces[face, FACE_MEETS_FEET] == 1.0 else FEET):
             if is_absent(point, contact):

@@ -3,8 +3,14 @@
 import pytest
 
 from sim_vehicle.autopilot.commander import failsafe_table
-from sim_vehicle.autopilot.commander.failsafe import MODE_OF, Failsafe
-from sim_vehicle.autopilot.commander.failsafe_table import OFFBOARD_LOSS, Action, FailsafeSituation, FailsafeTrigger
+from sim_vehicle.autopilot.commander.failsafe import Failsafe
+from sim_vehicle.autopilot.commander.failsafe_table import (
+    MODE_OF,
+    OFFBOARD_LOSS,
+    Action,
+    FailsafeSituation,
+    FailsafeTrigger,
+)
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, INJECT_FAILURE
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION, DO_REPOSITION
 from sim_vehicle.autopilot.messages import Result
@@ -71,9 +77,8 @@ def test_of_two_failsafes_the_later_in_the_order_wins():
 @pytest.mark.parametrize("value", OFFBOARD_LOSS)
 def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
     flight = in_offboard(UP, COM_OBL_RC_ACT=value)
-    action, _ = OFFBOARD_LOSS[value]
     assert until_it_acts(flight, 2.0) == pytest.approx(1.07, abs=0.05)
-    assert flown(flight) is MODE_OF[action]
+    assert flown(flight) is MODE_OF[OFFBOARD_LOSS[value]]
     assert flight.autopilot.modes.intended is Mode.OFFBOARD
     assert "Failsafe activated" in flight.texts()
 

@@ -157,7 +157,6 @@ def test_a_mission_cleared_in_flight_is_a_failsafe():
     [
         ([LAND_AT_HOME, NORTH], "Mission rejected: starts with landing"),
         ([NORTH, TAKEOFF], "Mission rejected: takeoff not first waypoint item"),
-        ([item(kinds.ARM_DISARM), TAKEOFF], "Mission rejected: takeoff not first waypoint item"),
         ([item(kinds.TAKEOFF, up_m=-1.0)], "Mission rejected: Takeoff altitude below home altitude!"),
     ],
 )

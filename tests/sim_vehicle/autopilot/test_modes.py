@@ -249,7 +249,6 @@ def test_an_orbit_keeps_its_radius_its_speed_and_its_eye_on_the_centre(radius_m)
         looks = math.atan2(-out[1], -out[0])
         assert abs(math.remainder(yaw_of(flight.state.attitude_wxyz) - looks, 2 * math.pi)) < 0.2
     assert flight.height_m == pytest.approx(8.0, abs=0.1)
-    assert flight.autopilot.navigator.orbit_status[0] == radius_m
 
 
 def test_an_orbit_too_wide_is_not_flown_and_one_too_fast_is_slowed():

@@ -55,16 +55,9 @@ def test_forward_with_the_nose_east_is_east_and_an_acceleration_turns_with_the_w
     assert (north, east, down) == pytest.approx((0.0, -math.sin(0.5), math.cos(0.5)))
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [
-        *({"position": incomplete} for incomplete in ((None, None, -2.0), (1.0, None, -2.0))),
-        *({"frame": 8, name: (3.4e38, 3.4e38, 0.0)} for name in ("velocity", "acceleration_m_s2")),
-    ],
-)
-def test_what_leaves_an_axis_open_or_turns_into_too_much_for_a_float_means_stop(asked):
-    north_east = kinematic_plant.attitude_of_yaw(math.pi / 4)
-    assert offboard.trajectory_setpoint(target(**asked), north_east) == offboard.STOP
+@pytest.mark.parametrize("incomplete", [(None, None, -2.0), (1.0, None, -2.0)])
+def test_what_leaves_an_axis_open_means_stop(incomplete):
+    assert offboard.trajectory_setpoint(target(position=incomplete), NORTH) == offboard.STOP
 
 
 def test_without_setpoints_offboard_can_be_chosen_but_not_armed():

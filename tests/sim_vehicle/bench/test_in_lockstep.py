@@ -64,18 +64,6 @@ def test_what_is_removed_early_ends_early_and_only_once() -> None:
     assert (span.began_at_boot_us, span.ended_at_boot_us) == (1_004_000, 1_304_000)
 
 
-def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
-    pilot = standing()
-    cut = pilot.vehicle.inject(faults.link_cut())
-    pilot.command(400, 1, 0)
-    pilot.fly(1.0)
-    assert not pilot.received and not pilot.vehicle.truth.is_armed
-    cut.remove()
-    pilot.command(400, 1, 0)
-    pilot.fly(0.1)
-    assert pilot.received and pilot.vehicle.truth.is_armed
-
-
 def test_a_clock_jumps_and_jumps_back(tmp_path: Path) -> None:
     pilot = standing()
     pilot.fly(0.5)

@@ -7,12 +7,12 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import NotInLockstep
-from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.estimator.samples import CaptureSample, FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
-from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor, MotionCapture
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor
 from sim_vehicle.hil.parameters import px4_parameters
-from sim_vehicle.hil.sensors import air_at, to_body
+from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.mavlink.encode import Encoder
@@ -52,7 +52,7 @@ def test_a_fix_in_the_units_of_the_protocol():
 
 
 def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
-    sent = on_the_wire(MotionCapture(20_000, (1.0, 2.0, -3.0), (0.8, 0.0, 0.6, 0.0), 4e-6, 2.5e-5))
+    sent = on_the_wire(CaptureSample(20_000, (1.0, 2.0, -3.0), (0.8, 0.0, 0.6, 0.0), 2e-3, 5e-3))
     assert (sent.frame_id, sent.estimator_type) == (dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_ESTIMATOR_TYPE_VISION)
     assert (sent.x, sent.y, sent.z) == (1.0, 2.0, -3.0)
     assert tuple(sent.q) == pytest.approx((0.8, 0.0, 0.6, 0.0))
@@ -151,25 +151,11 @@ def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
         exchange.received(wrong)
 
 
-HALF = math.sqrt(0.5)
 FOLDABLE = load_built_in("foldable")
 
 
 def of_kind(messages: list, kind: type) -> list:
     return [message for message in messages if isinstance(message, kind)]
-
-
-@pytest.mark.parametrize(
-    ("attitude", "seen"),
-    [
-        ((1.0, 0.0, 0.0, 0.0), (1, 2, 3)),
-        ((HALF, 0.0, 0.0, HALF), (2, -1, 3)),  # the nose sees east, the right side looks south
-        ((HALF, 0.0, HALF, 0.0), (-3, 2, 1)),  # the nose looks up, the belly north
-        ((HALF, HALF, 0.0, 0.0), (1, 3, -2)),  # the right side sees down, the belly looks west
-    ],
-)
-def test_a_vector_of_the_world_in_the_body(attitude, seen):
-    assert to_body(attitude, (1.0, 2.0, 3.0)) == pytest.approx(seen)
 
 
 def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
@@ -187,7 +173,7 @@ def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
     assert all(messages[-1].time_us == 4000 * (i + 1) for i, messages in enumerate(steps))
     everything = [message for messages in steps for message in messages]
     assert len(of_kind(everything, HilGps)) == 10
-    assert len(of_kind(everything, MotionCapture)) == 50
+    assert len(of_kind(everything, CaptureSample)) == 50
     sensors = of_kind(everything, HilSensor)
     assert sum(sensor.magnetic_field_frd_gauss is not None for sensor in sensors) == 50
     assert sum(sensor.air is not None for sensor in sensors) == 50

@@ -4,6 +4,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import serve_px4
 from sim_vehicle.shell.truth_file import load_clock, load_truth
 from tests.clients.simulator import free_port
+from tests.sim_vehicle.vehicle_client import in_a_thread
 
 TIMEOUT_S = 5.0
 HOVER = [0.78] * 4
@@ -75,22 +77,15 @@ def compiled_physics() -> None:
 @contextmanager
 def served(speed: float = 0.0, truth_path: Path | None = None) -> Iterator[tuple[int, list[str]]]:
     """The server in a thread: its port, and what it says."""
-    port, said, stop, listening = free_port(socket.SOCK_STREAM), [], threading.Event(), threading.Event()
+    port, said, listening = free_port(socket.SOCK_STREAM), [], threading.Event()
 
     def tell(text: str) -> None:
         said.append(text)
         listening.set()
 
-    arguments = (new_vehicle, port, speed, truth_path, stop.is_set, tell)
-    thread = threading.Thread(target=serve_px4, args=arguments)
-    thread.start()
-    assert listening.wait(TIMEOUT_S)
-    try:
+    with in_a_thread(partial(serve_px4, new_vehicle, port, speed, truth_path, tell=tell)):
+        assert listening.wait(TIMEOUT_S)
         yield port, said
-    finally:
-        stop.set()
-        thread.join(TIMEOUT_S)
-        assert not thread.is_alive()
 
 
 def connected(port: int) -> closing[Px4Client]:

@@ -2,7 +2,6 @@
 
 import socket
 import struct
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,12 +16,12 @@ from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import open_port, px4_ports
-from sim_vehicle.shell.ports import Port, UdpPeerPort
+from sim_vehicle.shell.ports import UdpPeerPort
 from sim_vehicle.shell.realtime import RealtimePace, serve
 from sim_vehicle.shell.truth_file import load_truth
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.clients.simulator import wait_until
-from tests.sim_vehicle.vehicle_client import End, heard_until
+from tests.sim_vehicle.vehicle_client import End, heard_until, in_a_thread
 
 KEY = bytes(range(32))
 
@@ -132,7 +131,7 @@ def test_unsigned_packets_are_taken_where_the_parameter_says(guarded, sign_cfg, 
     assert bool(guarded.ends[1].all("COMMAND_ACK")) == heard
 
 
-# As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
+# MAVSDK goes by the codes. As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
 FILE_REQUESTS = [
     *[(3, b"/", 6), (3, b"", 6), (3, b"/nope", 10), (4, b"/nope", 10), (14, b"/nope", 10), (10, b"/nope", 10)],
     *[(13, b"/a\0/b", 10), (5, b"", 4), (15, b"", 4), (1, b"", 4), (99, b"", 7), (2, b"", None)],
@@ -160,19 +159,6 @@ TIMEOUT_S = 5.0
 
 def new_vehicle() -> SimulatedVehicle:
     return SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-
-
-@contextmanager
-def served(vehicle: SimulatedVehicle, *ports: Port, truth_path: Path | None = None) -> Iterator[None]:
-    stop = threading.Event()
-    thread = threading.Thread(target=serve, args=(vehicle, ports, truth_path, stop.is_set))
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join(TIMEOUT_S)
-        assert not thread.is_alive()
 
 
 @contextmanager
@@ -222,7 +208,7 @@ def test_the_first_sender_becomes_the_companion_for_good():
     with bound() as companion, bound() as first, bound() as second:
         vehicle = new_vehicle()
         ports = px4_ports(vehicle, 0, 0, companion.getsockname())
-        with served(vehicle, *ports):
+        with in_a_thread(serve, vehicle, ports):
             companion.recv(2048)
             for sender in (first, second):
                 heartbeat = dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3).pack(dialect.MAVLink(None, 255, 190))
@@ -238,7 +224,7 @@ def test_it_flies_on_when_nobody_listens(tmp_path: Path):
         address = gone.getsockname()
     path = tmp_path / "truth.npz"
     vehicle = new_vehicle()
-    with served(vehicle, *px4_ports(vehicle, 0, 0, address), truth_path=path):
+    with in_a_thread(serve, vehicle, px4_ports(vehicle, 0, 0, address), path):
         wait_until(lambda: vehicle.time_boot_us >= 200_000, TIMEOUT_S, "it flies on")
     # And the truth is written at the end, with the wall clock of boot
     hits, series, epoch_us = load_truth(path)

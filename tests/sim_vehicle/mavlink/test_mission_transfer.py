@@ -64,7 +64,8 @@ class Exchange:
         self.asked: list[Any] = []
         self.answers: list[Any] = []
         self.link = SimpleNamespace(send=self.answers.append, now_us=1_000_000)
-        self.transfer = MissionTransfer(self.store, self.link)
+        board: Any = SimpleNamespace(autopilot=SimpleNamespace(missions=self.store))
+        self.transfer = MissionTransfer(self.link, board)
 
     @property
     def now_us(self) -> int:

@@ -27,14 +27,14 @@ def test_each_links_set_is_sent_at_its_rates(kind):
     for _ in range(round(seconds * 250)):
         vehicle.advance()
         counts.update(parser.decode(bytearray(raw)).get_msgId() for raw in link.take())
-    # GPS_RAW_INT comes with each fix, the origin once; there is no orbit, no target, no flow sensor and no range finder
+    # GPS_RAW_INT comes with each fix, the origin once; there is no flow sensor and no range finder
     expected = {
         **{stream.message_id: stream.rates.on(kind) for stream in KINDS if stream.rates.on(kind)},
         24: 8.0 if kind is LinkKind.ONBOARD else 5.0,
         49: 1 / seconds,
         42: 1.0,  # MISSION_CURRENT
     }
-    expected = {number: rate for number, rate in expected.items() if number not in (87, 106, 132, 360)}
+    expected = {number: rate for number, rate in expected.items() if number not in (106, 132)}
     measured = {number: count / seconds for number, count in counts.items()}
     assert measured == pytest.approx(expected, rel=0.05, abs=1 / seconds)
 
@@ -89,8 +89,6 @@ def test_what_a_hovering_vehicle_says_of_itself_and_of_its_place_agrees(hovering
     # Every axis is asked for, and the heading; no turning
     assert (asked.coordinate_frame, asked.type_mask) == (1, 0x800)
     assert (asked.x, asked.y, asked.z) == pytest.approx(hovering.position(), abs=0.2) and asked.vz == 0.0
-    # The mean distance of successive samples, whose noise is 0.25 m/s2 on each of three axes
-    assert hovering.last("VIBRATION").vibration_z == pytest.approx(0.25 * 4 / math.sqrt(math.pi), rel=0.3)
     field = hovering.last("HIGHRES_IMU")
     # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
     assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
@@ -106,21 +104,16 @@ def test_magnetometer_and_barometer_are_marked_when_they_are_new():
     assert sum(bool(f & 0x1A00) for f in fields) / 10 == pytest.approx(20.8, abs=0.5)
 
 
-def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_ground():
+def test_the_battery_drains_in_flight_and_is_full_again_on_the_ground():
     client = Client()
     client.send(dialect.MAVLink_param_set_message(1, 1, b"SIM_BAT_DRAIN", 20.0, 9))
     client.run(3.0)
     at_rest = client.last("BATTERY_STATUS")
-    client.take_off(6.0)
-    flying = client.last("BATTERY_STATUS")
     # 20 s would empty it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
-    client.run(10.0)
+    client.take_off(16.0)
     late = client.last("BATTERY_STATUS")
     assert at_rest.battery_remaining == 100 and at_rest.charge_state == 1
-    assert flying.current_battery > 1000 > at_rest.current_battery
-    assert at_rest.voltages[0] - flying.voltages[0] > 200
-    assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 300
-    assert late.current_consumed > 30
+    assert late.battery_remaining == 50 and late.voltages[0] < at_rest.voltages[0] - 300
     assert client.last("SYS_STATUS").battery_remaining == 50
     client.send(dialect.MAVLink_param_set_message(1, 1, b"BAT1_V_CHARGED", 1e30, 9))
     client.run(2.1)
