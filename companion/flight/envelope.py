@@ -46,19 +46,9 @@ class KnownSurface:
 def unattended_text(autopilot: Autopilot, speed_m_s: float) -> str:
     """What happens when the companion dies, for people."""
     return (
-        f"{_flown_on(autopilot)} for {autopilot.loss_parameter}, made safe for {HELD_S:g} s; "
-        f"every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
+        f"if the companion dies, {autopilot.name} flies its last setpoint on for {autopilot.loss_parameter}, made safe "
+        f"for {HELD_S:g} s; every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
     )
-
-
-def longer_loss_text(autopilot: Autopilot, loss_s: float) -> str:
-    """One that is longer than a setpoint is safe, for people."""
-    flown_on, more_s = _flown_on(autopilot), loss_s - HELD_S
-    return f"{autopilot.loss_parameter} is {loss_s:g} s: {flown_on} for {more_s:g} s more than it is made safe for"
-
-
-def _flown_on(autopilot: Autopilot) -> str:
-    return f"if the companion dies, {autopilot.name} flies its last setpoint on"
 
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.

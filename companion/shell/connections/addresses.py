@@ -65,9 +65,7 @@ def parsed(url: str) -> Endpoint:
     """Nothing is opened, and no name looked up. Raises AddressError."""
     scheme, separator, rest = url.partition("://")
     if not separator:
-        meant = _meant(url)
-        hint = f"use {_FORMS}." if meant is None else f"did you mean {meant}?"
-        raise AddressError(f"{url!r} is not a connection address: {hint}")
+        raise AddressError(f"{url!r} is not a connection address: use {_FORMS}.")
     if scheme not in _SCHEMES:
         raise AddressError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
     if scheme == "serial":
@@ -84,26 +82,6 @@ def parsed(url: str) -> Endpoint:
     if scheme == "udp":
         scheme = "udpin" if host in ("", "0.0.0.0", "[::]") else "udpout"
     return Endpoint(url, scheme, host, port)
-
-
-def _meant(text: str) -> str | None:
-    """What other programs' habits stand for: pymavlink's `udp:HOST:PORT`, a device, a host and port, a port alone."""
-    scheme, _, rest = text.partition(":")
-    known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
-    if text.startswith("/dev/"):
-        # PX4's TELEM2 for a companion.
-        device, _, baud = text.replace(",", ":").partition(":")
-        meant = f"serial://{device}:{baud or 921600}"
-    elif known is not None and _HOST_PORT.match(rest):
-        meant = f"{known}://{rest}"
-    elif text.isdecimal():
-        meant = f"udpin://0.0.0.0:{text}"
-    else:
-        meant = f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
-    try:
-        return parsed(meant).url
-    except AddressError:
-        return None
 
 
 def one_host(remote: Endpoint) -> tuple[socket.AddressFamily, Any]:
