@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 from companion.fence import Fence
@@ -113,6 +114,7 @@ class Planned:
     left_out: int = 0
 
 
+@lru_cache(maxsize=512)  # the laps of a repeat and the turns of an orbit mostly go the same ways
 def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """The item's own trajectory where that is free. A velocity item is flown as it is: it has no goal."""
     own, limits = trajectory_of(item, start_m, speeds), speeds.limits(item)
@@ -148,14 +150,12 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
 
 def _turn_by_turn(item: items.OrbitItem, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """At rest after each turn. Turns from one place are planned once: while one is planned, no setpoint is sent."""
-    planned, turns, place = dict[tuple[float, ...], Planned](), list[Planned](), start_m
+    turns, place = list[Planned](), start_m
     for number in range(math.ceil(item.turns)):
         turn = item.model_copy(update={"turns": min(1.0, item.turns - number)})
-        key = (turn.turns, *[round(axis_m / LEAST_GAP_M) for axis_m in place])
-        if key not in planned:
-            planned[key] = trajectory_around(turn, place, speeds, known)
-        turns.append(planned[key])
-        place = place if turns[-1].trajectory is None else turns[-1].trajectory.target_m
+        turns.append(trajectory_around(turn, place, speeds, known))
+        end = place if turns[-1].trajectory is None else turns[-1].trajectory.target_m
+        place = place if math.dist(end, place) < LEAST_GAP_M else end
     flown = [turn.trajectory for turn in turns if turn.trajectory is not None]
     return Planned(Chain(flown) if flown else None, True, sum(turn.left_out for turn in turns))
 

@@ -150,7 +150,7 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
     """The mission when nothing is hit, round what is known beforehand, or without that as it is written."""
     place: Vector3 = (0.0, 0.0, 0.0)
     known = replace(mission.known, patches=(), keeps_in=False) if is_as_written else mission.known
-    speeds, until_now_s, ways = mission.speeds, 0.0, dict[tuple[int, Vector3, SpeedLimits], Planned]()
+    speeds, until_now_s = mission.speeds, 0.0
     for step in items.program(mission.items):
         action, planned = step.action, Planned(stay(place))
         lasts_s: float | None = 0.0
@@ -170,9 +170,7 @@ def itinerary(mission: Mission, is_as_written: bool = False) -> Iterator[Leg]:
             case items.ReturnItem():
                 planned = home_around(place, action, speeds, known)
             case items.GoToItem() | items.VelocityItem() | items.PathItem() | items.OrbitItem():
-                # A repeat's laps mostly go the same ways.
-                way = (id(action), place, speeds)
-                planned = ways[way] = ways.get(way) or trajectory_around(action, place, speeds, known)
+                planned = trajectory_around(action, place, speeds, known)
                 if isinstance(action.yaw_deg, float | int) and planned.trajectory is not None:
                     # It turns on its way, and after it.
                     lasts_s = max(0.0, 180.0 / defaults.TURNING_DEG_S - planned.trajectory.duration_s)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from companion.flight import expectations
 from companion.flight.context import TURNING_RAD_S, FlightContext, Handler, Inputs, StepTally, Target, Transition
-from companion.flight.handlers.takeoff_and_landing import rests
 from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -173,14 +172,7 @@ class FlyItems(_OnTrajectory):
                     return False
                 if self._over_since_us is None:
                     self._over_since_us = now_us
-                is_there = self._is_there(flight)
-                return is_there and (not self._is_judged(flight) or rests(flight, self._steady, self._goal(flight)))
-
-    def _is_judged(self, flight: FlightContext) -> bool:
-        """Whether what is expected follows, and then the landing: its rest belongs to the item."""
-        after = [step.action for step in flight.steps[flight.step_index + 1 :]]
-        lands = isinstance(next(one for one in after if not isinstance(one, items.ExpectItem)), items.LandItem)
-        return lands and isinstance(after[0], items.ExpectItem)
+                return self._is_there(flight)
 
     def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
         """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
