@@ -13,17 +13,6 @@ AUTOPILOT_COMPONENT_ID = 1
 
 # MAV_TYPE: hover, sideways force and land detection are the same for all of these.
 MULTICOPTERS = {2: "quadrotor", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 29: "dodecarotor", 35: "decarotor"}
-# Types that are connected by mistake most often, with names for the error message.
-OTHER_TYPES = {
-    1: "fixed-wing aircraft",
-    3: "coaxial helicopter",
-    4: "helicopter",
-    6: "ground station",
-    10: "ground rover",
-    11: "boat",
-    12: "submarine",
-} | dict.fromkeys(range(19, 23), "VTOL aircraft")
-OTHER_AUTOPILOTS = {0: "generic autopilot", 8: "component without an autopilot"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +31,10 @@ def identify(heartbeat: messages.Heartbeat) -> Identity | str:
     """The vehicle's identity, or one sentence why it cannot be flown."""
     autopilot = AUTOPILOTS.get(heartbeat.autopilot)
     if autopilot is None:
-        name = OTHER_AUTOPILOTS.get(heartbeat.autopilot, "unknown autopilot")
-        return f"the vehicle's autopilot is not {NAMES} but {name} (MAV_AUTOPILOT {heartbeat.autopilot})"
+        return f"the vehicle's autopilot is not {NAMES} (MAV_AUTOPILOT {heartbeat.autopilot})"
     vehicle_type = MULTICOPTERS.get(heartbeat.vehicle_type)
     if vehicle_type is None:
-        name = OTHER_TYPES.get(heartbeat.vehicle_type, "unknown type")
-        return f"the vehicle is not a multicopter but: {name} (MAV_TYPE {heartbeat.vehicle_type})"
+        return f"the vehicle is not a multicopter (MAV_TYPE {heartbeat.vehicle_type})"
     return Identity(heartbeat.system_id, heartbeat.component_id, vehicle_type, autopilot)
 
 

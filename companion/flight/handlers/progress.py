@@ -41,10 +41,8 @@ class _OnTrajectory(Handler[FlightContext]):
 
     def _is_there(self, flight: FlightContext) -> bool:
         most_m = flight.mission.companion.flight.acceptance_radius_m
-        return math.dist(flight.reflex.place_ned_m(flight.latest), self._goal(flight)) <= most_m
-
-    def _goal(self, flight: FlightContext) -> Vector3:
-        return flight.local_ned_m(self._trajectory.target_m)
+        goal_ned_m = flight.local_ned_m(self._trajectory.target_m)
+        return math.dist(flight.reflex.place_ned_m(flight.latest), goal_ned_m) <= most_m
 
 
 class FlyItems(_OnTrajectory):

@@ -265,7 +265,7 @@ TOO_OLD = "ArduPilot 4.2.3 is too old: ArduPilot 4.3 is the oldest that flies"
 @pytest.mark.parametrize(
     ("vehicle", "words"),
     [
-        (FakeCopter(vehicle_type=1), ["the vehicle is not a multicopter but: fixed-wing aircraft (MAV_TYPE 1)"]),
+        (FakeCopter(vehicle_type=1), ["the vehicle is not a multicopter (MAV_TYPE 1)"]),
         (FakeCopter(flight_version=OLD), [TOO_OLD]),
         (FakeCopter(no_positions=True), ["no position: LOCAL_POSITION_NED"]),
         (refuses(ARM), ["not armed: arm: the vehicle answered FAILED"]),

@@ -28,7 +28,7 @@ def failed(vehicle: FakeVehicle):
     [
         (FakeVehicle(silent=True), "no HEARTBEAT from an autopilot within 10 s"),
         (FakeVehicle(autopilot=3), "ArduPilot"),
-        (FakeVehicle(vehicle_type=1), "fixed-wing"),
+        (FakeVehicle(vehicle_type=1), "not a multicopter (MAV_TYPE 1)"),
         (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 32.0 Hz"),
         (FakeVehicle(no_imu=True), "HIGHRES_IMU arrives at 0.0 Hz"),
         (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),

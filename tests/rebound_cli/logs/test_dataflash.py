@@ -191,7 +191,7 @@ def test_the_climb_rate_the_samples_and_the_frame_are_those_of_the_first_sensor(
     [
         ([("MSG", 0, "ArduPlane V4.5.7"), *IMU], "it is of ArduPlane V4.5.7"),
         ([("MSG", 0, "ArduCopter V4.2.3"), *IMU], "ArduCopter 4.3 and later"),
-        ([COPTER, ("PARM", 0, "FRAME_CLASS", 6.0, 0.0), *IMU], "helicopter"),
+        ([COPTER, ("PARM", 0, "FRAME_CLASS", 6.0, 0.0), *IMU], "not a multicopter .MAV_TYPE 4."),
         (IMU, "does not say what vehicle"),
         ([COPTER], "no IMU samples"),
         ([COPTER, IMU[0]], "no IMU samples"),

@@ -87,7 +87,7 @@ def test_of_several_systems_the_known_vehicle_with_imu_samples_is_taken(log, tmp
 @pytest.mark.parametrize(
     ("fill", "words"),
     [
-        (lambda log: log.heartbeat(autopilot=GENERIC), "autopilot is not PX4 or ArduPilot but generic autopilot"),
+        (lambda log: log.heartbeat(autopilot=GENERIC), "autopilot is not PX4 or ArduPilot \\(MAV_AUTOPILOT"),
         (lambda log: log.imu(), "no autopilot's heartbeat"),
         (lambda log: log.heartbeat(), "no HIGHRES_IMU from system 1"),
     ],
