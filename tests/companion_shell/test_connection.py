@@ -180,17 +180,17 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
 
 
 @pytest.mark.parametrize(
-    ("url", "named"),
+    ("url", "named", "words"),
     [
-        ("udpout://127.0.0.1:9", "127.0.0.1"),
-        ("udp://127.0.0.1:9", "127.0.0.1"),
-        ("serial:///dev/null:57600", "127.0.0.1"),
-        ("udpin://127.0.0.1:0", "no such"),
-        ("udpin://127.0.0.1:0", "::1"),
+        ("udpout://127.0.0.1:9", "127.0.0.1", "--peer 127.0.0.1 is for udpin"),
+        ("udp://127.0.0.1:9", "127.0.0.1", "--peer 127.0.0.1 is for udpin"),
+        ("serial:///dev/null:57600", "127.0.0.1", "--peer 127.0.0.1 is for udpin"),
+        ("udpin://127.0.0.1:0", "no such", "Host 'no such' is unknown"),
+        ("udpin://127.0.0.1:0", "::1", "Host '::1' is unknown"),
     ],
 )
-def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
-    with pytest.raises(ConnectionSetupError, match="--peer"):
+def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named, words):
+    with pytest.raises(ConnectionSetupError, match=words):
         open_connection(url, named)
 
 

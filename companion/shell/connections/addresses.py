@@ -13,7 +13,7 @@ import re
 import socket
 from typing import Any, NamedTuple, TypeAlias
 
-from companion.errors import AddressError, ConnectionSetupError
+from companion.errors import AddressError
 from companion.mavlink.signing import Signing
 from companion.shell.connections.connection import ANY_HOST, UdpConnection, resolve, udp_in
 from companion.shell.connections.peer import Peer
@@ -103,10 +103,5 @@ def _peer(text: str, listening: str) -> tuple[str, int | None]:
     """The number of a host, as the socket that listens there sees it, and its port where one is given."""
     host, _, port = text.rpartition(":") if _HOST_PORT.match(text) else (text, "", "")
     family, _ = resolve(listening or ANY_HOST, 0)
-    try:
-        _, address = resolve(host, 0, family)
-    except ConnectionSetupError as error:
-        version = "IPv6" if family == socket.AF_INET6 else "IPv4"
-        says = f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
-        raise ConnectionSetupError(says) from error
+    _, address = resolve(host, 0, family)
     return str(address[0]), int(port) if port else None
