@@ -145,7 +145,6 @@ class FlightContext:
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
-    told_by_position: bool = False  # that recoveries are not flown by attitude
     known: ObstacleMap = field(init=False)  # of the surroundings, mission coordinates
     unreachable: list[str] = field(default_factory=list)
     crashed: str = ""  # how, once it has

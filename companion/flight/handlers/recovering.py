@@ -9,8 +9,7 @@ from companion.reflex.recovery.collision import Progress
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     record, reason = flight.reflex.begin(estimate, FlightRoom(flight), now_us), flight.reflex.why_by_position
-    if reason is not None and not flight.told_by_position:
-        flight.told_by_position = True
+    if reason is not None:
         flight.report(now_us, "by_position", f"recovery by position, as law paper has it: {reason}", reason=reason)
     hit = record.report()
     force_m_s2, v_c, speed_m_s = hit.peak_specific_force_m_s2, hit.impact_velocity_ned_m_s, hit.impact_speed_m_s

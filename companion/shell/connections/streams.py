@@ -112,7 +112,6 @@ class StreamConnection:
         self._found: SimpleQueue[Stream] = SimpleQueue()
         self._closed = threading.Event()
         self._news = deque([] if missing is None else [f"{missing} Waiting for it."])
-        self._is_missed = missing is not None
         self._lost_s: float | None = None
         self.counts = LinkCounts()
         if stream is None:
@@ -138,7 +137,7 @@ class StreamConnection:
         if self._lost_s is not None:
             self.counts.reconnects += 1
             self._news.append(f"connected again after {time.monotonic() - self._lost_s:.1f} s: {self._stream.at}")
-        elif self._is_missed:
+        else:
             self._news.append(f"connected: {self._stream.at}")
 
     def _begin(self, old: Stream | None) -> None:
