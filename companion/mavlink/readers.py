@@ -153,11 +153,12 @@ def _heartbeat(
 def _attitude_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], thrust: float) -> Sample | None:
     if type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE:
         return None
-    if not 0.0 <= thrust <= messages.THRUST_FRACTION:
+    # ArduPilot's height control asks for less than none at a landing.
+    if not -1.0 <= thrust <= messages.THRUST_FRACTION:
         return Refused("ATTITUDE_TARGET", f"thrust {thrust:g}")
     w, x, y, z = q
     given = not type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and is_rotation(w, x, y, z)
-    return messages.AttitudeTarget(time_boot_ms * 1000, thrust, (w, x, y, z) if given else None)
+    return messages.AttitudeTarget(time_boot_ms * 1000, max(thrust, 0.0), (w, x, y, z) if given else None)
 
 
 def _vibration(clipping_0: int, clipping_1: int, clipping_2: int) -> Sample:
@@ -258,11 +259,6 @@ def _ekf_status(flags: int, velocity_variance: float, pos_horiz_variance: float,
     return messages.EstimatorStatus(ratios, bool(flags & EKF_VELOCITY_HORIZ), False)
 
 
-def _unbounded_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], thrust: float) -> Sample | None:
-    """What its height control asks for: at a landing less than none."""
-    return _attitude_target(time_boot_ms, type_mask, q, 0.0 if -1.0 <= thrust < 0.0 else thrust)
-
-
 def _cast_parameter(param_id: bytes, param_value: float, param_type: int) -> Sample | None:
     name = param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
     if not math.isfinite(param_value):
@@ -346,7 +342,6 @@ GUARD_READERS = READERS | _readers(
 # Beside them, or in their place: of ArduPilot.
 ARDUPILOT_READERS = _readers(
     {
-        dialect.MAVLink_attitude_target_message: _unbounded_target,
         dialect.MAVLink_param_value_message: _cast_parameter,
         EkfStatusReport: _ekf_status,
         dialect.MAVLink_rc_channels_message: _radio,
