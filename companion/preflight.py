@@ -139,7 +139,7 @@ class Preflight:
                 else:
                     self.heard_since_us = now_us
                     self.vehicle.identity, self.vehicle.autopilot = identity, identity.autopilot
-            case messages.Parameter(name, value) if name in self.vehicle.autopilot.asked(self.line):
+            case messages.Parameter(name, value) if name in self.vehicle.autopilot.parameters:
                 self.parameters[name] = value
             case messages.EstimatorStatus():
                 self.estimator.append(sample)
@@ -162,7 +162,7 @@ class Preflight:
             return
         self.ask_due_us = self.now_us + ASK_AGAIN_US
         autopilot = self.vehicle.autopilot
-        outgoing += [messages.ReadParameter(name) for name in autopilot.asked(self.line) if name not in self.parameters]
+        outgoing += [messages.ReadParameter(name) for name in autopilot.parameters if name not in self.parameters]
         is_known = self.vehicle.version is not None
         commands = [] if is_known else [messages.request_message(MessageId.AUTOPILOT_VERSION)]
         if self.streams.started_us is None:

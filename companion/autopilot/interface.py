@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup
+from companion.autopilot.setup import PreflightItem, Setup
 from companion.messages import MessageId, VehicleCommand
 
 
@@ -66,7 +66,7 @@ class Autopilot:
     loss_parameter: str  # for so many seconds the last setpoint is flown on
     rate_parameter: str  # of a link's share for streams, for people
     sight: Callable[[Setup], PreflightItem]  # the smallest hit that shows
-    asked: Callable[[SerialLine | None], tuple[str, ...]]  # parameters that preflight reads
+    parameters: tuple[str, ...]  # that preflight reads, as far as the vehicle has them
     judge_vehicle: tuple[Callable[[Setup], Iterable[PreflightItem]], ...]
     judge_parameters: Callable[[Setup], Iterable[PreflightItem]]
     # Of what preflight finds by listening, and of a vehicle that does not arm, for people.

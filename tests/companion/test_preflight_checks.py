@@ -233,8 +233,8 @@ def test_of_a_copter_the_lesser_imu_is_asked_for_too():
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
     known = {name: value for name, value in HEALTHY.items() if name != "COM_OF_LOSS_T"}
     survey = surveyed(known)
-    asked = [message for message in survey.advance([], 12_000_000) if isinstance(message, ReadParameter)]
-    assert asked == [ReadParameter("COM_OF_LOSS_T")]
+    asked = {message.name for message in survey.advance([], 12_000_000) if isinstance(message, ReadParameter)}
+    assert "COM_OF_LOSS_T" in asked and asked.isdisjoint(known)
     found = found_in(survey)["COM_OF_LOSS_T"]
     assert found.verdict is Verdict.DOUBTFUL and "did not tell" in found.found
 

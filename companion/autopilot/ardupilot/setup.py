@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup, judged, judged_loss, judged_settings
+from companion.autopilot.setup import PreflightItem, Setup, judged, judged_loss, judged_settings
 
 # For so long Copter flies the last attitude or velocity on.
 LOSS = "GUID_TIMEOUT"
@@ -132,12 +132,7 @@ _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     "FENCE_ENABLE": _fence,
     "FS_CRASH_CHECK": _crash_check,
 }
-PARAMETERS = (*_SETTINGS, YAW, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS)
-
-
-def asked(line: SerialLine | None) -> tuple[str, ...]:
-    """The parameters to be read."""
-    return PARAMETERS if line is None or line.baud is None else (*PARAMETERS, *OF_A_LINE)
+PARAMETERS = (*_SETTINGS, YAW, "FRAME_CLASS", *JERKS, *LEANS, *CHECKS, *OF_A_LINE)
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:

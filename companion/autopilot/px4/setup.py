@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 
-from companion.autopilot.setup import PreflightItem, SerialLine, Setup, judged, judged_loss, judged_settings
+from companion.autopilot.setup import PreflightItem, Setup, judged, judged_loss, judged_settings
 from companion.motion.config import GRAVITY_M_S2
 
 # For so long PX4 flies the last setpoint on.
@@ -33,15 +33,13 @@ LEAST_CAPTURED = {"EKF2_EVP_GATE": 50.0, "EKF2_ACC_NOISE": 1.0}
 PORTS, INSTANCES = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4"}, range(3)
 # MAV_n_MODE, and the rate that PX4's guide to companion computers recommends.
 ONBOARD, COMPANION_BAUD = 2, 921_600
-# CBRK_USB_CHK with which PX4 arms while a cable is in its USB port.
-USB_ALLOWED = 197_848
+# With which PX4 arms while a cable is in its USB port.
+USB_CHECK, USB_ALLOWED = "CBRK_USB_CHK", 197_848
 ROTORS = ("CA_ROTOR_COUNT", *(f"CA_ROTOR{number}_P{axis}" for number in range(4) for axis in "XY"))
-# Asked of a vehicle on a serial line, and of one on its USB port.
 OF_A_LINE = (
     *(f"MAV_{number}_{what}" for number in INSTANCES for what in ("CONFIG", "MODE", "RATE", "FORWARD")),
     *(f"SER_{port}_BAUD" for port in PORTS.values()),
 )
-OF_USB = ("CBRK_USB_CHK",)
 
 
 def rotors(setup: Setup) -> Iterator[PreflightItem]:
@@ -73,8 +71,8 @@ def port(setup: Setup) -> Iterator[PreflightItem]:
     if line is None:
         return
     if line.baud is None:
-        remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
-        is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
+        remedy = f"a wire to TELEM2; or {USB_CHECK} = {USB_ALLOWED}, then reboot"
+        is_refused = told.get(USB_CHECK) != USB_ALLOWED
         beyond = ": with a cable in it PX4 may not arm"
         yield judged("port", "PX4's USB port", is_refused, remedy, beyond=beyond)
         return
@@ -172,14 +170,7 @@ _SETTINGS: dict[str, Callable[[str, float, Setup], PreflightItem]] = {
     "CBRK_FLIGHTTERM": _termination,
     "MPC_ACC_HOR": _speeding_up,
 }
-PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", CAPTURE, *LEAST_CAPTURED, *ROTORS)
-
-
-def asked(line: SerialLine | None) -> tuple[str, ...]:
-    """The parameters to be read."""
-    if line is None:
-        return PARAMETERS
-    return (*PARAMETERS, *(OF_USB if line.baud is None else OF_A_LINE))
+PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", CAPTURE, *LEAST_CAPTURED, *ROTORS, *OF_A_LINE, USB_CHECK)
 
 
 def judge_parameters(setup: Setup) -> Iterator[PreflightItem]:

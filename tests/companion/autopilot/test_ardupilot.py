@@ -420,7 +420,7 @@ def test_what_was_not_told_is_doubtful_and_what_is_asked_is_judged():
     found = judged({})
     assert {item.verdict for item in found.values()} == {Verdict.DOUBTFUL}
     older = {"PSC_JERK_NE", "PSC_JERK_XY", "ANGLE_MAX", "ARMING_CHECK"}
-    assert {*setup.asked(None)} == {*HEALTHY} | older and {*ON_SERIAL2} <= {*setup.asked(UART)}
+    assert {*setup.PARAMETERS} == {*HEALTHY, *setup.OF_A_LINE} | older and {*ON_SERIAL2} <= {*setup.OF_A_LINE}
 
 
 def test_the_slowest_hit_that_shows_follows_from_the_filter():
