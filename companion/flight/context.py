@@ -129,7 +129,6 @@ class FlightContext:
     has_position: bool = True  # one came within the detector's `silence_s`; without, trajectories stand still
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
-    conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
     foreign_mode_since_us: int | None = None  # when the mode was first not ours, though perhaps nobody decided it
     armed_at_us: int | None = None
     steps: tuple[Step, ...] = field(init=False)

@@ -43,12 +43,10 @@ class KnownSurface:
         return patch.faces(minus(plus(place_ned_m, short_m, self.surface.normal_ned), self.origin_ned_m), self.reach_m)
 
 
-def unattended_text(autopilot: Autopilot, speed_m_s: float) -> str:
+def unattended_text(autopilot: Autopilot) -> str:
     """What happens when the companion dies, for people."""
-    return (
-        f"if the companion dies, {autopilot.name} flies its last setpoint on for {autopilot.loss_parameter}, made safe "
-        f"for {HELD_S:g} s; every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
-    )
+    flown_on = f"if the companion dies, {autopilot.name} flies its last setpoint on for {autopilot.loss_parameter}"
+    return f"{flown_on}, made safe for {HELD_S:g} s"
 
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.

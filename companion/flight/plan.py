@@ -1,7 +1,7 @@
 """The plan a person confirms, and the words for mission items."""
 
 from companion.autopilot.interface import Autopilot
-from companion.autopilot.known import ASSUMED, defaults
+from companion.autopilot.known import ASSUMED
 from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
 from companion.flight.envelope import unattended_text
@@ -12,8 +12,6 @@ from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision
 from companion.reflex.config import RecoveryConfig
 
-# The position gain asks for gamma * v_c of it backwards: above this gamma, for more than the impact speed.
-LARGE_GAMMA_S = round(1.0 / defaults.POSITION_GAIN_PER_S, 2)
 _DAMAGED = "On damage  a motor that works harder than before a hit"
 _AFTER = {"land": "land", "return": "return and land", "continue": "the next item", "abort": "abort"}
 
@@ -112,11 +110,12 @@ def describe_abort(abort_when: AbortWhen) -> str:
 
 def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]:
     """Items, fence and policies. Positions: NED from the arming position, metres."""
-    lines = []
+    lines = list[str]()
     for number, item in enumerate(mission.items, start=1):
         lines += _item_lines(f"{number}.", item, "Items" if number == 1 else "")
     on_hit, obstacles = mission.on_collision, mission.obstacles
-    lines += [
+    return [
+        *lines,
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
         f"On a hit   detector {mission.companion.detector}, recovery law {_law(mission.recovery)}; "
         f"then {_after_recovery(on_hit)}",
@@ -125,11 +124,8 @@ def mission_lines(mission: Mission, autopilot: Autopilot = ASSUMED) -> list[str]
         *[f"Known      {describe_patch(patch)}" for patch in obstacles.known],
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
-        f"Unattended {unattended_text(autopilot, _fastest_m_s(mission))}",
+        f"Unattended {unattended_text(autopilot)}",
     ]
-    if mission.recovery.law != "adaptive" and max(mission.recovery.gamma_per_axis) > LARGE_GAMMA_S:
-        lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
-    return lines
 
 
 def _law(recovery: RecoveryConfig) -> str:
@@ -139,12 +135,6 @@ def _law(recovery: RecoveryConfig) -> str:
         return f"paper with gamma {north_s:g}, {east_s:g} s"
     uses_gamma = recovery.law == "normal" or recovery.tangential == "kept"
     return f"{recovery.law} with gamma {north_s:g} s" if uses_gamma else recovery.law
-
-
-def _fastest_m_s(mission: Mission) -> float:
-    flight, actions = mission.companion.flight, [step.action for step in items.program(mission.items)]
-    speeds = [action.speed_m_s or flight.cruise_speed_m_s for action in actions if hasattr(action, "speed_m_s")]
-    return max(speeds, default=flight.takeoff_speed_m_s)
 
 
 def _item_lines(number: str, item: items.MissionItem, lead: str = "") -> list[str]:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from companion import messages
 from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
-from companion.link.refusals import LASTING_US
 from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
 from companion.reflex.config import LEAST_FRACTION, LIES_US, LONGEST_LOSS_S
@@ -15,7 +14,7 @@ from companion.reflex.detection.detector import NO_POSITION, Situation
 def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams, heard_us = flight.vehicle, flight.streams, flight.vehicle.last_received_us
-    mode, armed, conflicts, is_mode_lost = vehicle.mode, vehicle.armed, vehicle.conflicts, False
+    mode, armed, is_mode_lost = vehicle.mode, vehicle.armed, False
     if vehicle.identity is not None and now_us - vehicle.last_received_us >= OLD_NEWS_US:
         is_mode_lost = vehicle.is_mode_known
         vehicle.unsure_since_us = now_us  # after a silence samples may be as old as the silence
@@ -35,11 +34,8 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
                 vehicle.identity, vehicle.autopilot = identity, identity.autopilot
                 flight.reflex.monitor.estimator.hides_clipping = identity.autopilot.filters_imu
                 flight.reflex.keeps_trim = identity.autopilot.keeps_trim
-            if sample.system_id != vehicle.identity.system_id:
-                continue
             if identify(sample) != vehicle.identity:
-                # Another vehicle with the same system ID: its messages do not count.
-                vehicle.conflicts += 1
+                # Another vehicle's, be it with the same system ID, do not count.
                 continue
         elif isinstance(sample, messages.Refused):
             if flight.refusals.add(sample.message, now_us):
@@ -63,12 +59,6 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         is_mode_lost |= was_known and not vehicle.is_mode_known
         streams.count(type(sample), now_us)
     _advance_trajectory_time(flight, heard_us, now_us)
-    if vehicle.conflicts > conflicts:
-        last_us, flight.conflict_us = flight.conflict_us, now_us
-        # Once a run of contradictions.
-        if last_us is None or now_us - last_us >= LASTING_US:
-            text = "conflicting mode reports: one was not confirmed"
-            flight.report(now_us, "implausible", text, conflicts=vehicle.conflicts)
     if vehicle.mode is not None and (mode is None or vehicle.mode.custom_mode != mode.custom_mode):
         flight.report(now_us, "mode", f"mode {vehicle.mode_name}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:

@@ -120,8 +120,7 @@ class GuardConnect(Meet[GuardContext]):
             self._ask_again(guard, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(guard, now_us)
-        unattended = unattended_text(guard.vehicle.autopilot, guard.mission.limits.max_speed_m_s)
-        guard.report(now_us, "unattended", unattended)
+        guard.report(now_us, "unattended", unattended_text(guard.vehicle.autopilot))
         return Transition(Trigger.CONNECTED) if complaint is None else Transition(Trigger.REFUSED, complaint)
 
 

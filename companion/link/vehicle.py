@@ -82,7 +82,6 @@ class Vehicle:
     unconfirmed_mode: messages.CurrentMode | None = None  # reported once, and not the companion's
     is_disarm_unconfirmed: bool = False  # reported once, in the air
     is_disarm_unexplained: bool = False  # and not yet contradicted by a vehicle that says that it flies
-    conflicts: int = 0
 
     @property
     def is_mode_known(self) -> bool:
@@ -123,7 +122,6 @@ class Vehicle:
                     self._accept_armed(False)
                 elif self.is_disarm_unexplained and self.landed is messages.LandedState.IN_AIR:
                     self.is_disarm_unexplained = False
-                    self.conflicts += 1
             case messages.Battery():
                 # One forged or broken report ends no flight.
                 self.battery_percent = max(sample.remaining_percent, self.battery_told or 0)
@@ -137,7 +135,6 @@ class Vehicle:
         self.mode_received_us = now_us
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
         if is_known or not own_modes or self.unconfirmed_mode is not None:
-            self.conflicts += is_known and self.unconfirmed_mode is not None
             self.count_mode(report, failsafe)
             self.unconfirmed_mode = None
         else:
@@ -151,7 +148,6 @@ class Vehicle:
     def _update_armed(self, armed: bool) -> None:
         is_on_ground = self.landed is messages.LandedState.ON_GROUND
         if armed or self.armed is not True or self.is_disarm_unconfirmed or is_on_ground:
-            self.conflicts += armed and self.is_disarm_unexplained
             self._accept_armed(armed)
         else:
             self.is_disarm_unconfirmed = self.is_disarm_unexplained = True

@@ -2,8 +2,6 @@
 
 # For so long the last setpoint is flown on: COM_OF_LOSS_T.
 LOSS_US = 1_000_000
-# From a distance to the setpoint to the speed towards it: MPC_XY_P.
-POSITION_GAIN_PER_S = 0.95
 MAX_SPEED_M_S = 12.0  # MPC_XY_VEL_MAX
 MAX_YAW_RATE_DEG_S = 200.0  # MC_YAWRATE_MAX
 # With which its own modes turn: MPC_YAWRAUTO_MAX.

@@ -330,7 +330,6 @@ def test_one_forged_heartbeat_pauses_the_setpoints_and_ends_nothing(state, forge
     f.run_for(0.3)
     assert f.state != "aborted"
     assert f.setpoints_since(since), "on again with the vehicle's own next reports"
-    assert [event.kind for event in f.events if "conflicting" in event.text] == ["implausible"]
 
 
 @pytest.mark.parametrize("answers", [[], [0]])
