@@ -96,6 +96,22 @@ def test_raw_samples_are_clipped_before_the_mean() -> None:
     assert min(output.specific_force_frd_m_s2[0] for output in outputs) > -0.32 * clip
 
 
+def test_a_sensor_above_the_centre_shows_force_and_velocity_of_its_own() -> None:
+    # Given a vehicle without drag, whose only force is along its own z axis, and its sensor 5 cm above the centre
+    plant = hovering(quiet(load_built_in("foldable"), imu__above_centre_m=0.05))
+    start, before = len(plant.truth.series()["time_boot_us"]), plant.state.body[10:12].copy()
+    # When it turns to fly north-east
+    outputs = flown(plant, at(2, 1, -2), 0.1)
+    # Then sideways the sensor shows how its place turns, and the velocity is that of its place, as late as all is
+    p, q = plant.state.body[10:12] - before
+    force = sum(np.array(output.specific_force_frd_m_s2) for output in outputs) * 0.004
+    assert abs(q) > 0.3
+    assert force[:2] == pytest.approx([-0.05 * q, 0.05 * p], rel=1e-3)
+    moved = outputs[-1].velocity_ned_m_s - plant.truth.series()["velocity_ned_m_s"][start + len(outputs) - 6]
+    p, q, _ = outputs[-6].angular_velocity_frd_rad_s
+    assert moved[:2] == pytest.approx([-0.05 * q, 0.05 * p], rel=0.1)
+
+
 def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
     airframe = filtered(changes={"estimate": {"kind": "markov"}})
     plant = hovering(airframe, seed=5)
