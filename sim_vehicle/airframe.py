@@ -129,7 +129,7 @@ class Imu(Part):
     """Between two raw samples."""
     integration_interval_us: Annotated[int, Field(gt=0)]
     """Averaging interval of one HIGHRES_IMU sample (PX4: 1e6 / IMU_INTEG_RATE)."""
-    above_centre_m: float = 0.0
+    above_centre_m: Annotated[float, Field(ge=-0.15, le=0.15)] = 0.0
     """Height of the sensor above the centre of mass. The vehicle is not told (EKF2_IMU_POS_Z is 0)."""
     accelerometer_range_m_s2: Positive
     """Raw samples are clipped here, per axis."""

@@ -61,7 +61,6 @@ class Baseline(ABC):
         if isinstance(sample, Attitude):
             state.attitude_wxyz = sample.attitude_wxyz
         elif isinstance(sample, ImuSample):
-            state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             reading = self.look(state, sample, situation)
             if reading is not None:
                 impact = judge(state, sample.time_boot_us, reading, situation.off_reason)

@@ -166,7 +166,7 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
             case float():
                 return value * math.exp(chance.uniform(-math.log(3.0), math.log(3.0)))
             case dict():
-                return {key: varied(part) for key, part in value.items()}
+                return {key: varied(part) for key, part in value.items() if key != "above_centre_m"}
         return type(value)(map(varied, value))
 
     drawn = load_built_in(chance.choice(built_in_airframes())).model_dump()
@@ -185,6 +185,7 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
     control["velocity_i_per_s2"] = chance.uniform(0.0, 0.4) * p * p
     control["position_p_per_s"] = chance.uniform(0.1, 0.5) * p
     rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
+    drawn["imu"]["above_centre_m"] = chance.uniform(-0.05, 0.1)
     return drawn | {"rotors": rotors}
 
 

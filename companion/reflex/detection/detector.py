@@ -9,7 +9,6 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from companion.messages import MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.detection.free_flight import ThrustGain
 
@@ -148,7 +147,6 @@ class DetectorState:
     last_loud_boot_us: int = 0  # of the present contact, or the latest one
     peak_specific_force_m_s2: float = 0.0  # of that contact, per unit mass, the largest in one sample so far
     threshold_m_s2: float = 0.0  # what a sample must reach now
-    last_frd_m_s2: Vector3 = ZERO  # of the newest sample, at the point that the vehicle turns about
     thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
 
 

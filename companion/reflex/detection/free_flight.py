@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.config import CURRENT_US, MOTORS_RAD_S2
+from companion.motion.config import CURRENT_US
 from companion.motion.vector import ZERO
 from companion.reflex import config as reflex
 
@@ -57,11 +57,9 @@ class Lever:
 
     def learn(self, force_frd_m_s2: Vector3, turned_frd_rad_s2: Vector3, spread_m_s2: float) -> None:
         """Take what the lever known so far leaves of a force beside its mean, the angular acceleration, and the
-        standard deviation of such forces. No motor turns a vehicle faster than MOTORS_RAD_S2."""
+        standard deviation of such forces."""
         (x, y, _), (p, q, _) = force_frd_m_s2, turned_frd_rad_s2
         square = p * p + q * q
-        if square > MOTORS_RAD_S2**2:
-            return
         self._shown += q * x - p * y + self.below_m * square
         self._square += square
         total = (spread_m_s2 / reflex.LEVER_M) ** 2 + self._square

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
-from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, SHOWN_US
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
 from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
 from companion.reflex import config as reflex
@@ -64,6 +64,7 @@ class FusedState(DetectorState):
     contact_began_boot_us: int = 0
     kind: ImpactKind = ImpactKind.UNKNOWN  # of the present contact, or the latest one
     observed: Impact | None = None  # the first loud sample while it is observed whether that is a hand
+    last_frd_m_s2: Vector3 = ZERO  # at the centre, as the next
     before_frd_m_s2: Vector3 = ZERO  # of the sample before the last
     before_threshold_m_s2: float = 0.0  # before the last sample was learnt: it may be a hit's first
     force: tuple[float, Vector3] = (0.0, ZERO)
@@ -71,9 +72,9 @@ class FusedState(DetectorState):
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
     def side_threshold_m_s2(self, config: reflex.FusedConfig) -> float:
-        """Horizontal threshold, m/s^2. The lever's error adds to the noise as far as motors turn the vehicle."""
-        turned_rad_s2 = min(math.hypot(*self.turn.turned_frd_rad_s2), MOTORS_RAD_S2)
-        return math.hypot(self.threshold_m_s2, config.noise_factor * self.lever.error_m * turned_rad_s2)
+        """Horizontal threshold, m/s^2. In a turn the lever's error adds to the noise."""
+        turned_m_s2 = config.noise_factor * self.lever.error_m * math.hypot(*self.turn.turned_frd_rad_s2)
+        return math.hypot(self.threshold_m_s2, turned_m_s2)
 
     def side_force(self, config: reflex.FusedConfig, f: Vector3) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.

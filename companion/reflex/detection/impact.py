@@ -27,18 +27,18 @@ class ContactForce:
     has_gap: bool = False  # whether samples are missing; PX4's own estimate does not lack them
     begun_boot_us: int | None = None
 
-    def add(self, sample: ImuSample, felt_frd_m_s2: Vector3, elapsed_us: int, attitude_wxyz: Quaternion) -> None:
-        """Take one IMU sample above the threshold, what it shows of the point that the vehicle turns about, so long
-        after the one before it, and the attitude at its time.
+    def add(self, sample: ImuSample, elapsed_us: int, attitude_wxyz: Quaternion) -> None:
+        """Take one IMU sample above the threshold, so long after the one before it, and the attitude at its time.
 
         The first one comes so long after the latest time without contact.
         """
-        force = body_to_ned(attitude_wxyz, minus(felt_frd_m_s2, self.free_frd_m_s2))
+        f = sample.specific_force_frd_m_s2
+        force = body_to_ned(attitude_wxyz, minus(f, self.free_frd_m_s2))
         # Of the time before the first sample only its own window is known.
         elapsed_s = 1e-6 * (elapsed_us if self.forces_ned_m_s2 else min(elapsed_us, self.averaging_us))
         is_contiguous = elapsed_us < 2 * self.averaging_us  # less than one window is missing
         self.has_gap |= not is_contiguous
-        self.is_clipped |= max(map(abs, sample.specific_force_frd_m_s2)) >= CLIPPED_SHARE * self.range_m_s2
+        self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
         self.impulse_ned_m_s = plus(self.impulse_ned_m_s, elapsed_s, force)
         self.forces_ned_m_s2.append(force)
         if len(self.forces_ned_m_s2) == 2 and is_contiguous:
@@ -174,8 +174,7 @@ class ImpactEstimator(Motion):
         contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2)
         contact.is_clipped = self.hides_clipping or not is_shown
         if is_shown:
-            felt = plus(free, 1.0, impact.specific_force_frd_m_s2)
-            contact.add(imu, felt, imu.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
+            contact.add(imu, imu.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
         return contact
 
     def follow(self, sample: ImuSample, state: DetectorState) -> None:
@@ -183,8 +182,7 @@ class ImpactEstimator(Motion):
         estimate, contact, is_over = self.estimate, self.contact, state.phase is not Phase.CONTACT
         assert estimate is not None, "an impact has begun"
         if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
-            elapsed_us = sample.time_boot_us - self.earlier_imu.time_boot_us
-            contact.add(sample, state.last_frd_m_s2, elapsed_us, self.strapdown.valid_wxyz)
+            contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
             if contact.begun_boot_us is not None and estimate.impact.evidence is Evidence.FORCE:
                 error_us = contact.averaging_us // 4
                 estimate = replace(estimate, time_boot_us=contact.begun_boot_us, time_error_us=error_us)

@@ -34,7 +34,7 @@ class RateJump(Innovation):
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
     turned_frd_rad_s2: Vector3 = ZERO
-    """Angular acceleration up to the newest sample, of roll and pitch; none across a gap."""
+    """Angular acceleration by motors up to the newest sample, of roll and pitch; none across a gap."""
     lasting_rad_s2: float = 0.0  # the same in the mean of RATE_MEMORY_US
     variance_rad2_s2: float = 0.0
     shown: float = 0.0
@@ -50,7 +50,8 @@ class RateJump(Innovation):
         self.newest_rad_s, self.over_us = (p, q, r), time_us - before_us
         self.step_rad_s = i, j, k = p - x, q - y, r - z
         per_s = 1e6 / (reflex.ACROSS_THRUST * self.over_us) if 0 < self.over_us < LONGEST_GAP_US else 0.0
-        self.turned_frd_rad_s2 = (i * per_s, j * per_s, 0.0)
+        is_by_motors = per_s * math.hypot(i, j) <= MOTORS_RAD_S2
+        self.turned_frd_rad_s2 = (i * per_s, j * per_s, 0.0) if is_by_motors else ZERO
         on = a * i + b * j + c * k
         # The one between is the middle one, unless the newest step goes back: behind where the last began, or less far.
         if on < 0.0:

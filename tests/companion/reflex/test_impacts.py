@@ -67,8 +67,7 @@ def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(la
 def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
     for number, force in enumerate(pushes, start=1):
-        felt = (force, 0.0, -9.81)
-        contact.add(ImuSample(1_000_000 + number * every_us, felt, STILL), felt, every_us, LEVEL)
+        contact.add(ImuSample(1_000_000 + number * every_us, (force, 0.0, -9.81), STILL), every_us, LEVEL)
     assert contact.has_gap or not contact.is_fully_measured(False, (0.0, 0.0, 0.0))
 
 
@@ -79,8 +78,7 @@ def test_a_contact_is_clipped_that_ends_before_it_has_stopped_the_vehicle(came_m
     # Given the chatter of a rigid frame, far below the sensor's range: 0.5 m/s, or 1.8 where samples are apart
     contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
     for number in range(1, 4):
-        felt = (-40.0, 0.0, -9.81)
-        contact.add(ImuSample(1_000_000 + number * 1000 * every_ms, felt, STILL), felt, 1000 * every_ms, LEVEL)
+        contact.add(ImuSample(1_000_000 + number * 1000 * every_ms, (-40.0, 0.0, -9.81), STILL), 1000 * every_ms, LEVEL)
     came_ned_m_s = (came_m_s, 0.0, 0.0)
     assert contact.is_fully_measured(False, came_ned_m_s)
     # When it is over and the vehicle would go on into it
@@ -110,7 +108,6 @@ def test_a_contact_that_is_over_has_the_normal_of_its_whole_impulse_and_is_whole
             begun(estimator, force=(-30.0, -30.0, 0.0))
         if number > 1:
             state.last_loud_boot_us = sample.time_boot_us
-            state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             estimator.follow(sample, state)
             assert not estimator.estimate.is_final
     # When it is over
