@@ -185,7 +185,7 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
     control["velocity_i_per_s2"] = chance.uniform(0.0, 0.4) * p * p
     control["position_p_per_s"] = chance.uniform(0.1, 0.5) * p
     rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
-    drawn["imu"]["above_centre_m"] = chance.uniform(-0.05, 0.1)
+    drawn["imu"]["above_centre_m"] = chance.uniform(-0.02, 0.05)
     return drawn | {"rotors": rotors}
 
 
