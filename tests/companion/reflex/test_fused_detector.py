@@ -268,24 +268,37 @@ def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     assert Flight(imu_every_us=imu_every_us, **scene).fly(until_us) == []
 
 
+def rolling(rad_s2, from_us=1_500_000, turns_rad_s=6e-6 * math.pi):
+    """Angular acceleration and rate of a vehicle that rolls to and fro, by time."""
+    return (
+        lambda t_us: rad_s2 * math.sin(turns_rad_s * max(t_us - from_us, 0)),
+        lambda t_us: (1e-6 * rad_s2 / turns_rad_s * (1.0 - math.cos(turns_rad_s * max(t_us - from_us, 0))), 0.0, 0.0),
+    )
+
+
 @pytest.mark.parametrize("above_m", [0.08, -0.05])
 def test_what_a_sensor_beside_the_centre_shows_of_a_turn_is_no_hit_and_a_push_then_is(above_m):
-    # Given a vehicle that rolls to and fro by 60 rad/s^2, its sensor above the centre or below, and a push of 4 m/s^2
-    begins_us, turns_rad_s = 1_500_000, 6e-6 * math.pi
-
-    def turn(t_us):
-        return 60.0 * math.sin(turns_rad_s * max(t_us - begins_us, 0))
-
-    def rates(t_us):
-        return (60e-6 / turns_rad_s * (1.0 - math.cos(turns_rad_s * max(t_us - begins_us, 0))), 0.0, 0.0)
+    # Given a vehicle that rolls, its sensor above the centre or below, and a push of 4 m/s^2
+    turned, rates = rolling(60.0)
 
     def push(t_us):
-        return (0.0, above_m * turn(t_us) + (4.0 if t_us >= HIT_US else 0.0), 0.0)
+        return (0.0, above_m * turned(t_us) + (4.0 if t_us >= HIT_US else 0.0), 0.0)
 
     flight = Flight(push, rates=rates, heard=(Attitude, AttitudeTarget))
     # When it flies on, then the push alone is a hit, in its first whole sample; where the sensor is has been learnt
     assert [i.sample_time_boot_us for i in flight.fly(3_500_000)] == [pytest.approx(HIT_US + 4_000, abs=4_000)]
     assert flight.state.lever.below_m == pytest.approx(-above_m, abs=0.01)
+
+
+@pytest.mark.parametrize(("rad_s2", "is_known"), [(8.0, False), (15.0, True)])
+def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has_shown_where_the_sensor_is(
+    rad_s2, is_known
+):
+    flight = Flight(rates=rolling(rad_s2)[1], heard=(Attitude, AttitudeTarget))
+    assert flight.fly(3_500_000) == []
+    flight.state.turn.turned_frd_rad_s2, flight.state.threshold_m_s2 = (48.0, -36.0, 0.0), 1.75
+    most_m_s2 = 1.9 if is_known else math.hypot(1.75, 4.2 * 0.05 * 60.0)
+    assert flight.state.side_threshold_m_s2(FusedConfig()) == pytest.approx(most_m_s2, rel=0.1)
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
