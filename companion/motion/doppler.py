@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import GpsFix, LocalPosition, Vector3
 from companion.motion import config as numbers
-from companion.motion.delay import Delay
+from companion.motion.slope import Slope
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, flat, limited, minus, plus, towards
 
@@ -28,9 +28,13 @@ class Doppler:
     late_s: float = 0.0  # carried on by so much
     variance_m2_s2: float = numbers.DOPPLER_M_S**2
     known: int = 1
-    delay: Delay = field(
-        default_factory=lambda: Delay(
-            numbers.RECEIVER_DELAY_S, numbers.RECEIVER_SPREAD_S, numbers.RECEIVER_LATEST_S, numbers.RECEIVER_REPEATS
+    delay: Slope = field(
+        default_factory=lambda: Slope(
+            numbers.RECEIVER_DELAY_S,
+            numbers.RECEIVER_SPREAD_S,
+            0.0,
+            numbers.RECEIVER_LATEST_S,
+            numbers.RECEIVER_REPEATS,
         )
     )
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
@@ -42,7 +46,7 @@ class Doppler:
         out."""
         if is_free:
             self._learn(sample, strapdown)
-        self.late_s, error_s = self.delay.found_s(self.variance_m2_s2)
+        self.late_s, error_s = self.delay.found(self.variance_m2_s2)
         faster = _faster_by(strapdown, self.late_s)
         if faster is None:
             return
@@ -68,7 +72,7 @@ class Doppler:
         )
 
     def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
-        usual_s = self.delay.expected_s
+        usual_s = self.delay.expected
         faster = _faster_by(strapdown, usual_s)
         if faster is None:
             return
@@ -77,9 +81,9 @@ class Doppler:
         change = plus(ZERO, 1.0 / usual_s, faster)
         most_m_s = numbers.GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
-        if math.hypot(*plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change)) < most_m_s:
+        if math.hypot(*plus(behind, self.delay.found(self.variance_m2_s2)[0], change)) < most_m_s:
             self.delay.learn(behind, change)
-        noise = limited(plus(behind, self.delay.found_s(self.variance_m2_s2)[0], change), most_m_s)
+        noise = limited(plus(behind, self.delay.found(self.variance_m2_s2)[0], change), most_m_s)
         self.known = min(self.known + 1, numbers.MEMORY_STEPS)
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 

@@ -2,6 +2,7 @@
 
 import math
 import random
+from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -24,7 +25,7 @@ AidType = TypeVar("AidType", bound=Aid)
 SampleType = TypeVar("SampleType", bound=Sample)
 
 
-class Sensor(Generic[AidType, SampleType]):
+class Sensor(ABC, Generic[AidType, SampleType]):
     """Sees every interval, and has a sample at its rate.
 
     A sample comes at the moment that it shows. A filter of our own fuses it later, as late as the airframe says; PX4 is
@@ -42,9 +43,9 @@ class Sensor(Generic[AidType, SampleType]):
         """
         return self.sample(time_us, body, faces) if time_us % self._period_us < self._interval_us else None
 
+    @abstractmethod
     def sample(self, time_us: int, body: Floats, faces: Floats) -> SampleType:
         """One of this moment."""
-        raise NotImplementedError
 
     def noise(self, deviation: float) -> Vector3:
         """One error an axis."""

@@ -21,19 +21,16 @@ def add_raw_sample(
     x = (state.body[3] - velocity_before[0]) / raw_s
     y = (state.body[4] - velocity_before[1]) / raw_s
     z = (state.body[5] - velocity_before[2]) / raw_s - GRAVITY_M_S2
-    # Beside the centre of mass the sensor turns with the vehicle.
+    # Above the centre of mass the sensor turns with the vehicle.
     p_rad_s2 = (state.body[10] - scratch.rates_before[0]) / raw_s
     q_rad_s2 = (state.body[11] - scratch.rates_before[1]) / raw_s
+    above = (-q_rad_s2 * constants.imu_above_m, p_rad_s2 * constants.imu_above_m, 0.0)
     limit = constants.accelerometer_range_m_s2
     shaken = scratch.shaken
     if disturbance.shakes == 1:
         shake(state, raw_s, constants, disturbance, shaken)
     for i in range(3):
-        true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z
-        if i == 0:
-            true -= q_rad_s2 * constants.imu_above_m
-        elif i == 1:
-            true += p_rad_s2 * constants.imu_above_m
+        true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z + above[i]
         seen = (
             true
             + constants.accelerometer_bias_frd_m_s2[i]

@@ -1,6 +1,4 @@
-"""What free flight teaches: the noise of the specific force on each axis, where it is measured, and the specific force
-of full thrust.
-"""
+"""What free flight teaches: the noise of the specific force on each axis, and the specific force of full thrust."""
 
 import math
 from dataclasses import dataclass
@@ -41,30 +39,6 @@ class ForceNoise:
         self.variance_m2_s4 = (v_x, v_y, v_z)
         self.side_m_s2 = grown * math.sqrt(max(v_x, v_y, reflex.LEAST_SIDE_SHARE**2 * v_z))
         self.vertical_m_s2 = grown * math.sqrt(v_z)
-
-
-@dataclass(slots=True)
-class Lever:
-    """How far the accelerometer is below the point that the vehicle turns about, m. Changed only by `learn`.
-
-    Below it by z an accelerometer shows (q' z, -p' z, 0) besides. z is the least-squares estimate with a prior.
-    """
-
-    below_m: float = 0.0
-    error_m: float = reflex.LEVER_M  # its standard deviation
-    _shown: float = 0.0
-    _square: float = 0.0
-
-    def learn(self, force_frd_m_s2: Vector3, turned_frd_rad_s2: Vector3, spread_m_s2: float) -> None:
-        """Take what the lever known so far leaves of a force beside its mean, the angular acceleration, and the
-        standard deviation of such forces."""
-        (x, y, _), (p, q, _) = force_frd_m_s2, turned_frd_rad_s2
-        square = p * p + q * q
-        self._shown += q * x - p * y + self.below_m * square
-        self._square += square
-        total = (spread_m_s2 / reflex.LEVER_M) ** 2 + self._square
-        if total > 0.0:
-            self.below_m, self.error_m = self._shown / total, spread_m_s2 / math.sqrt(total)
 
 
 @dataclass(slots=True)

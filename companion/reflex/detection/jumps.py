@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from companion.messages import Vector3
-from companion.motion.config import LONGEST_GAP_US, MEMORY_STEPS, MOTORS_RAD_S2, SHOWN_US
-from companion.motion.delay import Delay
+from companion.motion.config import DELAY_S, LATEST_S, LONGEST_GAP_US, MEMORY_STEPS, MOTORS_RAD_S2, SHOWN_US
+from companion.motion.slope import Slope
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex import config as reflex
@@ -33,9 +33,10 @@ class RateJump(Innovation):
     step_rad_s: Vector3 = ZERO
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
-    turned_frd_rad_s2: Vector3 = ZERO
-    """Angular acceleration up to the newest sample, of roll and pitch, as far as motors make it; none across a gap."""
-    lasting_rad_s2: float = 0.0  # the same in the mean of RATE_MEMORY_US; 0 where no motor makes it
+    above_frd_per_s2: Vector3 = ZERO
+    """What each metre above the point that the vehicle turns about is accelerated by, (-q', p', 0): by the angular
+    acceleration of roll and pitch up to the newest sample, as far as motors make it; none across a gap."""
+    lasting_rad_s2: float = 0.0  # that angular acceleration in the mean of RATE_MEMORY_US; 0 where no motor makes it
     variance_rad2_s2: float = 0.0
     shown: float = 0.0
     """The largest ratio of late: an estimator that has missed a hit shows it later than the gyroscopes."""
@@ -52,7 +53,7 @@ class RateJump(Innovation):
         per_s = 1e6 / (reflex.ACROSS_THRUST * self.over_us) if 0 < self.over_us < LONGEST_GAP_US else 0.0
         most_per_s = MOTORS_RAD_S2 / (math.hypot(i, j) or 1.0)
         is_by_motors, per_s = per_s <= most_per_s, min(per_s, most_per_s)
-        self.turned_frd_rad_s2 = (i * per_s, j * per_s, 0.0)
+        self.above_frd_per_s2 = (-j * per_s, i * per_s, 0.0)
         on = a * i + b * j + c * k
         # The one between is the middle one, unless the newest step goes back: behind where the last began, or less far.
         if on < 0.0:
@@ -85,7 +86,7 @@ class VelocityJump:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
     since_us: int = 0  # velocities before this time are not compared
-    delay: Delay = field(default_factory=Delay)
+    delay: Slope = field(default_factory=lambda: Slope(DELAY_S, DELAY_S, 0.0, LATEST_S))
     variance_m2_s2: float = 0.0
     known: int = 0
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
@@ -110,7 +111,7 @@ class VelocityJump:
         flown = ((minus(b.sum_ned_m_s, a.sum_ned_m_s), 1e-6 * us) for (a, b), us in pairs)
         change = _newest_less_mean((n / over_s, e / over_s, d / over_s) for (n, e, d), over_s in flown)
         self.newest, self.compared_us = (step, change), times[1:]
-        return plus(step, self.delay.found_s(self.variance_m2_s2)[0], change)
+        return plus(step, self.delay.found(self.variance_m2_s2)[0], change)
 
     def learn(self, step: Vector3) -> None:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""

@@ -7,12 +7,20 @@ import pytest
 
 from companion.mavlink.readers import _gps_raw
 from companion.messages import GpsFix, LocalPosition, Refused
-from companion.motion.config import EARTH_M, FINEST_DOPPLER_M_S, LATEST_S, RECEIVER_DELAY_S, SAME_M_S, SettledConfig
-from companion.motion.delay import Delay
+from companion.motion.config import (
+    DELAY_S,
+    EARTH_M,
+    FINEST_DOPPLER_M_S,
+    LATEST_S,
+    RECEIVER_DELAY_S,
+    SAME_M_S,
+    SettledConfig,
+)
 from companion.motion.doppler import Doppler
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import tilt_rad, turned, yaw_rad
 from companion.motion.settling import SettlingMonitor
+from companion.motion.slope import Slope
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, plus
 from companion.reflex.belief.motion_estimator import MotionEstimator
@@ -42,11 +50,11 @@ NOISE_M_S = 0.05
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
 def test_one_step_that_was_a_hit_moves_the_delay_little_and_never_beyond_what_can_be_flown(axis):
-    delay = Delay()
+    delay = Slope(DELAY_S, DELAY_S, 0.0, LATEST_S)
     delay.learn(plus(ZERO, -1.0, axis), axis)
-    assert delay.found_s(NOISE_M_S**2)[0] < 0.06
+    assert delay.found(NOISE_M_S**2)[0] < 0.06
     delay.learn(plus(ZERO, -100.0, axis), plus(ZERO, 10.0, axis))
-    assert delay.found_s(NOISE_M_S**2)[0] == LATEST_S
+    assert delay.found(NOISE_M_S**2)[0] == LATEST_S
 
 
 G = 9.80665
@@ -127,7 +135,7 @@ def test_the_delay_is_learnt_where_the_vehicle_speeds_up_and_brakes(late_s):
     for tick in range(7_500):
         air.step(2.0 * math.sin(2.0e-3 * tick))
     # Then its delay is known, and its velocity is the vehicle's own as of now
-    assert air.doppler.delay.found_s(air.doppler.variance_m2_s2)[0] == pytest.approx(late_s, abs=0.015)
+    assert air.doppler.delay.found(air.doppler.variance_m2_s2)[0] == pytest.approx(late_s, abs=0.015)
     assert air.doppler.velocity_ned_m_s[0] == pytest.approx(air.velocities[-1], abs=0.2)
     assert air.doppler.variance_m2_s2 < 1.2 * FINEST_DOPPLER_M_S**2
 
@@ -137,7 +145,7 @@ def test_a_steady_flight_teaches_no_delay_and_the_receivers_noise_also_when_it_g
     for air.noise_m_s in (0.4, 0.8):
         for _ in range(7_500):
             air.step()
-        assert air.doppler.delay.found_s(air.doppler.variance_m2_s2)[0] == pytest.approx(RECEIVER_DELAY_S, abs=0.02)
+        assert air.doppler.delay.found(air.doppler.variance_m2_s2)[0] == pytest.approx(RECEIVER_DELAY_S, abs=0.02)
         assert math.sqrt(air.doppler.variance_m2_s2) == pytest.approx(air.noise_m_s, rel=0.25)
 
 
@@ -145,12 +153,12 @@ def test_a_hit_that_the_receiver_shows_before_any_sample_is_neither_its_noise_no
     air = Air(0.012, noise_m_s=0.05)
     for tick in range(7_500):
         air.step(2.0 * math.sin(2.0e-3 * tick))
-    known, variance_m2_s2 = air.doppler.delay.found_s(air.doppler.variance_m2_s2)[0], air.doppler.variance_m2_s2
+    known, variance_m2_s2 = air.doppler.delay.found(air.doppler.variance_m2_s2)[0], air.doppler.variance_m2_s2
     air.velocities = [velocity - 7.0 for velocity in air.velocities]
     air.reported_off_m_s = 7.0
     for _ in range(25):
         air.step()
-    assert air.doppler.delay.found_s(air.doppler.variance_m2_s2)[0] == pytest.approx(known, abs=0.002)
+    assert air.doppler.delay.found(air.doppler.variance_m2_s2)[0] == pytest.approx(known, abs=0.002)
     assert air.doppler.variance_m2_s2 < 1.3 * variance_m2_s2
 
 
