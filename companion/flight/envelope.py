@@ -49,6 +49,11 @@ def unattended_text(autopilot: Autopilot) -> str:
     return f"{flown_on}, made safe for {HELD_S:g} s"
 
 
+def longer_loss_text(autopilot: Autopilot, loss_s: float) -> str:
+    """Of a vehicle that flies it on for longer."""
+    return f"{unattended_text(autopilot)}; it is {loss_s:g} s, {loss_s - HELD_S:g} s more than that"
+
+
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
 

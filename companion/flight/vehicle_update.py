@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from companion import messages
 from companion.autopilot.interface import Pilot
 from companion.flight.context import FlightContext
+from companion.flight.envelope import longer_loss_text
 from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.reflex.config import LEAST_FRACTION, LIES_US, LONGEST_LOSS_S
+from companion.reflex.config import HELD_S, LEAST_FRACTION, LIES_US, LONGEST_LOSS_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
@@ -107,6 +108,8 @@ def _note_attitude_parameter(flight: FlightContext, told: messages.Parameter, no
         flight.refusals.add("PARAM_VALUE", now_us)
         return
     parameters[told.name] = told.value
+    if told.name == autopilot.loss_parameter and flight.reflex.loss_s is None and told.value > HELD_S:
+        flight.report(now_us, "unattended", longer_loss_text(autopilot, told.value), loss_s=told.value)
     if all(name in parameters for name in autopilot.attitude_parameters):
         flight.reflex.loss_s = round(autopilot.attitude_held_s(parameters), 3)  # single precision on the wire
 

@@ -31,8 +31,10 @@ SETPOINT_IDS = frozenset(
 _COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 # What may ask for a mode.
 REQUEST_IDS = frozenset({*_COMMANDS, dialect.MAVLINK_MSG_ID_SET_MODE})
-# Setpoints by name, for MAVSDK.
-SETPOINTS = frozenset(dialect.mavlink_map[number].msgname for number in SETPOINT_IDS)
+# The same by name, for MAVSDK.
+SETPOINTS, REQUESTS = (
+    frozenset(dialect.mavlink_map[number].msgname for number in ids) for ids in (SETPOINT_IDS, REQUEST_IDS)
+)
 STICKS_IDS = (dialect.MAVLINK_MSG_ID_MANUAL_CONTROL, dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE)
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 

@@ -15,7 +15,7 @@ from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import AttachedGuard
 from companion.guard.states import State
-from companion.mavlink.moves import SETPOINTS
+from companion.mavlink.moves import REQUESTS, SETPOINTS
 from companion.mavlink.named import packet_from
 from companion.reflex.recovery.collision import CollisionReport
 from companion.report import Event
@@ -184,9 +184,11 @@ class CollisionGuard:
 
     def _outgoing(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread, the last before the socket."""
+        if name not in SETPOINTS and name not in REQUESTS:
+            return True
         with self._changed:
             # Also of one that cannot be read
-            passes = self._is_over or not self.holds or name not in SETPOINTS
+            passes = self._is_over or not self.holds or name in REQUESTS
             if not self._is_over and (packet := packet_from(name, source, fields_json)):
                 with self._guarded():
                     passes = self._guard.lets_pass(packet)

@@ -215,12 +215,18 @@ def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_t
     assert f.run_to_end().outcome == "completed"
 
 
-def test_com_of_loss_t_is_asked_for_until_it_is_told():
-    # Given a link that loses the first two answers
-    vehicle = FakeVehicle(loss_s=3.0, lost_answers=2)
-    # When it is flown, then it is asked until it has answered
-    flight(vehicle).run_to("mission")
-    assert vehicle.lost_answers == -1
+@pytest.mark.parametrize(("loss_s", "said"), [(1.0, []), (3.0, [3.0])])
+def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told_once(loss_s, said):
+    # Given a vehicle that acts so late when setpoints stop, and a link that loses the first two answers
+    vehicle = FakeVehicle(loss_s=loss_s, lost_answers=2)
+    # When it is flown
+    flown = flight(vehicle)
+    flown.run_to("mission")
+    # Then that is told before take-off
+    told = [event for event in flown.events if event.kind == "unattended"]
+    assert [event.data["loss_s"] for event in told] == said
+    assert all("it is 3 s, 2 s more than that" in event.text for event in told)
+    assert vehicle.lost_answers == -1, "it was asked until it had answered"
 
 
 def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> list[TimeSync]:
