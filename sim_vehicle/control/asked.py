@@ -6,6 +6,7 @@ from sim_vehicle.control.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoi
 from sim_vehicle.physics.layout import ASKED_ATTITUDE, ASKED_RATES, ASKED_TRAJECTORY, SetpointRows
 from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.quantities import Quaternion
 
 
 class AskedSetpoint:
@@ -18,6 +19,8 @@ class AskedSetpoint:
         self._value, self._given = self._asked.value.reshape(-1), self._asked.given.reshape(-1)
         self._yaw = self._asked.yaw
         self._taken: Setpoint | None = None
+        # Compiled before the flight: at its first attitude, that of a recovery, nothing would be told for 0.3 s.
+        self._turn((1.0, 0.0, 0.0, 0.0))
 
     def take(self, setpoint: Setpoint) -> None:
         """Write the setpoint, if it is not the one that is there."""
@@ -37,8 +40,11 @@ class AskedSetpoint:
             asked.rates_frd_rad_s[:] = setpoint.rates_frd_rad_s
             return
         asked.level = ASKED_ATTITUDE
-        matrix_from_quaternion(np.array([0.0] * 6 + [*setpoint.attitude_wxyz]), asked.attitude)
+        self._turn(setpoint.attitude_wxyz)
         self._yaw[:] = (0.0, 0.0, setpoint.yaw_rate_rad_s)
+
+    def _turn(self, attitude_wxyz: Quaternion) -> None:
+        matrix_from_quaternion(np.array([0.0] * 6 + [*attitude_wxyz]), self._asked.attitude)
 
     def _take_trajectory(self, setpoint: TrajectorySetpoint) -> None:
         if self._asked.level != ASKED_TRAJECTORY:

@@ -1,6 +1,8 @@
 """The plant as a whole: it hovers, senses as a Pixhawk does, knows itself as badly as stated, or begins in flight."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -15,6 +17,26 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import flown, quiet
+
+
+KERNELS = """
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.control.setpoint import AttitudeSetpoint
+from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.plant.plant import Plant
+from sim_vehicle.scene import Scene
+
+plant = Plant(load_built_in("foldable"), Scene(), 1)
+plant.step(None, False)
+known = len(matrix_from_quaternion.signatures)
+plant.step(AttitudeSetpoint((1.0, 0.0, 0.0, 0.0), 0.5), True)
+assert len(matrix_from_quaternion.signatures) == known
+"""
+
+
+def test_the_first_attitude_of_a_flight_finds_its_kernel_compiled() -> None:
+    # In a process of its own, which nobody else has warmed
+    subprocess.run([sys.executable, "-c", KERNELS], check=True)
 
 
 def at(north: float, east: float, down: float) -> TrajectorySetpoint:
