@@ -18,7 +18,6 @@ from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import flown, quiet
 
-
 KERNELS = """
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.control.setpoint import AttitudeSetpoint
