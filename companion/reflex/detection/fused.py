@@ -150,7 +150,8 @@ class FusedDetector:
         if type(sample) is ImuSample:
             before_us, now_us = state.last_sample_boot_us, sample.time_boot_us
             state.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, self._config)
-            force_frd_m_s2 = plus(sample.specific_force_frd_m_s2, state.below_m, state.turn.above_frd_per_s2)
+            (x, y, z), (a, b, _), below_m = sample.specific_force_frd_m_s2, state.turn.above_frd_per_s2, state.below_m
+            force_frd_m_s2 = (x + below_m * a, y + below_m * b, z)
             impact = self._imu(state, sample, force_frd_m_s2, situation, motion)
             state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, force_frd_m_s2
             return impact
