@@ -91,6 +91,8 @@ class TruthRecorder:
     faults: list[FaultSpan] = field(default_factory=list)
     on_hit: Callable[[Hit], None] | None = None
     """Told of each as soon as it is over."""
+    touching: Callable[[], tuple[Floats, World] | None] = lambda: None
+    """The row of the hit that is not over, and its world."""
     _path: bytearray = field(default_factory=bytearray)
 
     def record(self, row: Floats) -> None:
@@ -100,27 +102,15 @@ class TruthRecorder:
 
     def add_hit(self, row: Floats, world: World) -> None:
         """Add a finished row of `PlantState.finished_hits`."""
-        hit = Hit(
-            obstacle=world.names[int(row[layout.HIT_FACE])],
-            contact_at_boot_us=float(row[layout.HIT_START_US]),
-            ended_at_boot_us=float(row[layout.HIT_LAST_US]),
-            contact_position_ned_m=vector(row[layout.HIT_POSITION]),
-            impact_velocity_ned_m_s=vector(row[layout.HIT_VELOCITY]),
-            normal_ned=vector(row[layout.HIT_NORMAL]),
-            max_fold_m=float(row[layout.HIT_FOLD_M]),
-            peak_force_n=float(row[layout.HIT_PEAK_N]),
-            rebound_velocity_ned_m_s=vector(row[layout.HIT_EXIT_VELOCITY]),
-            impulse_ned_n_s=vector(row[layout.HIT_IMPULSE]),
-            energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
-            energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
-            kind=world.kinds[int(row[layout.HIT_FACE])],
-            contact_point_ned_m=vector(row[layout.HIT_POINT]),
-            surface_velocity_ned_m_s=vector(row[layout.HIT_SURFACE_VELOCITY]),
-            frame_offset_ned_m=vector(row[layout.HIT_FRAME_OFFSET]),
-        )
+        hit = _hit(row, world)
         self.hits.append(hit)
         if self.on_hit is not None:
             self.on_hit(hit)
+
+    def hits_so_far(self) -> list[Hit]:
+        """The one that is not over as it has been so far: a vehicle that lies against a wall touches it to the end."""
+        touching = self.touching()
+        return self.hits if touching is None else [*self.hits, _hit(*touching)]
 
     def series(self) -> dict[str, Floats]:
         """The path, one row an IMU interval: arrays by name, each with frame and unit in it."""
@@ -133,3 +123,25 @@ class TruthRecorder:
             "arm_fold_m": rows[:, 12 : 12 + self.rotors],
             "peak_contact_force_n": rows[:, 11],
         }
+
+
+def _hit(row: Floats, world: World) -> Hit:
+    """Of a row of `PlantState`."""
+    return Hit(
+        obstacle=world.names[int(row[layout.HIT_FACE])],
+        contact_at_boot_us=float(row[layout.HIT_START_US]),
+        ended_at_boot_us=float(row[layout.HIT_LAST_US]),
+        contact_position_ned_m=vector(row[layout.HIT_POSITION]),
+        impact_velocity_ned_m_s=vector(row[layout.HIT_VELOCITY]),
+        normal_ned=vector(row[layout.HIT_NORMAL]),
+        max_fold_m=float(row[layout.HIT_FOLD_M]),
+        peak_force_n=float(row[layout.HIT_PEAK_N]),
+        rebound_velocity_ned_m_s=vector(row[layout.HIT_EXIT_VELOCITY]),
+        impulse_ned_n_s=vector(row[layout.HIT_IMPULSE]),
+        energy_before_j=float(row[layout.HIT_ENERGY_BEFORE_J]),
+        energy_after_j=float(row[layout.HIT_ENERGY_AFTER_J]),
+        kind=world.kinds[int(row[layout.HIT_FACE])],
+        contact_point_ned_m=vector(row[layout.HIT_POINT]),
+        surface_velocity_ned_m_s=vector(row[layout.HIT_SURFACE_VELOCITY]),
+        frame_offset_ned_m=vector(row[layout.HIT_FRAME_OFFSET]),
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from bench.cases.hits import POLE_OFFSET_SHARES, SPEEDS_M_S, HitCase, vehicle_of_hit
 from bench.cases.vehicles import AIRFRAMES
 from bench.fly.lockstep import Stepped
-from bench.fly.wire import FOLLOWED_S, PATIENCE_S, hits_so_far, on_its_way
+from bench.fly.wire import FOLLOWED_S, PATIENCE_S, on_its_way
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from sim_vehicle.physics.layout import HIT_ACTIVE
@@ -51,7 +51,6 @@ def fly(hit: HitCase) -> tuple[SimulatedVehicle, Guard, int | None]:
     flight = Stepped(vehicle, guard)
     flight.links[0].introduce()
     rest_us = to_rest(flight, guard, free_s + PATIENCE_S)
-    hits_so_far(vehicle)
     return vehicle, guard, rest_us
 
 

@@ -23,7 +23,6 @@ from sim_vehicle.quantities import Vector3, vector
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
-from sim_vehicle.world import build_world
 
 # HIGHRES_IMU asked for, by what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
@@ -99,13 +98,6 @@ def on_its_way(
     return vehicle, velocity, free_s
 
 
-def hits_so_far(vehicle: SimulatedVehicle) -> Sequence[Hit]:
-    """The one that a vehicle still leans on is as it has been so far."""
-    if vehicle.state.hit[HIT_ACTIVE] == 1.0:
-        vehicle.truth.add_hit(vehicle.state.hit, build_world(vehicle.obstacles))
-    return vehicle.truth.hits
-
-
 class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
     """The vehicle went past the obstacle: the case is at fault, not a detector."""
 
@@ -141,7 +133,7 @@ def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET
             touched, left = True, round(FOLLOWED_S / interval_s)
     if not touched:
         raise NoTouch(f"{case.approach} at {case.speed_m_s} m/s was missed")
-    return HeardHit(hits_so_far(vehicle)[0], heard, contact_m_s2)
+    return HeardHit(vehicle.truth.hits_so_far()[0], heard, contact_m_s2)
 
 
 def _ear(vehicle: SimulatedVehicle, rate: int) -> tuple[Link, Decoder]:

@@ -151,7 +151,7 @@ def killed(flight: Flight, touch: Hit) -> Json:
     while not is_down(vehicle) and vehicle.time_boot_us < until_us:
         step()
     since_s = 1e-6 * (killed_us - touch.contact_at_boot_us)
-    later = [hit for hit in vehicle.truth.hits if hit.contact_at_boot_us >= killed_us]
+    later = [hit for hit in vehicle.truth.hits_so_far() if hit.contact_at_boot_us >= killed_us]
     # The touch itself is no second one, whenever it came.
     again_m_s = hardest(later[1:] if since_s < 0.0 else later)
     ground_m_s = math.hypot(*vehicle.truth.series()["velocity_ned_m_s"][-1]) if is_down(vehicle) else None

@@ -89,6 +89,5 @@ def fly_mission_lockstep(
     if not companion.finished:
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
         report = replace(report, outcome="failed", reason=reason)
-    return Flown(
-        report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US, jumps=clock_jumps(truth.faults))
-    )
+    jumps = clock_jumps(truth.faults)
+    return Flown(report, wall_clock_s, FlightTruth(truth.hits_so_far(), truth.series(), EPOCH_US, jumps=jumps))

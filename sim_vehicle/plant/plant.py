@@ -69,7 +69,7 @@ class Plant:
         self._state_box = boxed(self.state)
         self._constants_box, self._disturbance_box = boxed(self.constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
-        self.truth = TruthRecorder(keeps_path, airframe.rotor_count)
+        self.truth = TruthRecorder(keeps_path, airframe.rotor_count, touching=self._touching)
         self.faults = Faults(scene.faults, airframe, scene.wind_ned_m_s, seed, self.state)
         self.truth.faults = self.faults.spans
 
@@ -80,16 +80,20 @@ class Plant:
 
     def change_world(self, world: World) -> None:
         """Put other obstacles around the vehicle, none of them through it; a hit on one that goes is over."""
-        hit = self.state.hit
-        if hit[HIT_ACTIVE] == 1.0:
+        if (touching := self._touching()) is not None:
+            hit, _ = touching
             row = np.flatnonzero(world.rows_in(self.around.world) == int(hit[HIT_FACE]))
             if len(row) == 0:
-                self.truth.add_hit(hit, self.around.world)
+                self.truth.add_hit(*touching)
                 hit[HIT_ACTIVE] = 0.0
             else:
                 hit[HIT_FACE] = row[0]
         x, y, z = self._body[:3].tolist()
         self.around = self.around.changed(world, (x, y, z), int(self.state.time_us))
+
+    def _touching(self) -> tuple[Floats, World] | None:
+        hit = self.state.hit
+        return (hit, self.around.world) if hit[HIT_ACTIVE] == 1.0 else None
 
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""

@@ -20,7 +20,7 @@ def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: 
 
     ``stalls``: boot times at which its clock stood, and for how long.
     """
-    hits = json.dumps([asdict(hit) for hit in truth.hits])
+    hits = json.dumps([asdict(hit) for hit in truth.hits_so_far()])
     faults = json.dumps([asdict(fault) for fault in truth.faults])
     arrays: dict[str, Any] = {**truth.series(), "hits": hits, "faults": faults, "epoch_at_boot_us": epoch_at_boot_us}
     arrays["stalls"] = np.array(stalls, dtype=np.int64).reshape(-1, 2)

@@ -52,7 +52,7 @@ def work_out_flown(case: HitCase) -> Json:
 
 def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
     """Found: the companion told of the first contact, or of one that a guard's bounce made soon after."""
-    hits, series = vehicle.truth.hits, vehicle.truth.series()
+    hits, series = vehicle.truth.hits_so_far(), vehicle.truth.series()
     false = sum(not any(_tells_of(hit, collision) for hit in hits) for collision in told)
     result: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": false, "touched": bool(hits)}
     if not hits:

@@ -96,6 +96,14 @@ def test_friction_along_the_wall_is_coulombs(friction: float) -> None:
     assert along > 0
 
 
+def test_a_hit_that_is_not_over_is_known_as_it_has_been_so_far() -> None:
+    plant = throw(FOLDABLE, 1.0, duration_s=0.108)
+    (so_far,) = plant.truth.hits_so_far()
+    assert plant.truth.hits == [] and so_far.peak_force_n > 0.0
+    (over,) = motors_off(plant, 0.3).truth.hits_so_far()
+    assert plant.truth.hits == [over] and over.contact_at_boot_us == so_far.contact_at_boot_us
+
+
 @pytest.mark.parametrize("name", ["foldable", "rigid"])
 @pytest.mark.parametrize("speed_m_s", [1.0, 2.5, 5.0])
 @pytest.mark.parametrize("yaw_deg", [0, 20])
