@@ -124,13 +124,20 @@ class Surface(Part):
     """One foot on the ground, for a quarter of the vehicle's mass."""
 
 
+SensorOffset = Annotated[float, Field(ge=-0.15, le=0.15)]
+
+
 class Imu(Part):
     raw_interval_us: Annotated[int, Field(gt=0)]
     """Between two raw samples."""
     integration_interval_us: Annotated[int, Field(gt=0)]
     """Averaging interval of one HIGHRES_IMU sample (PX4: 1e6 / IMU_INTEG_RATE)."""
-    above_centre_m: Annotated[float, Field(ge=-0.15, le=0.15)] = 0.0
+    above_centre_m: SensorOffset = 0.0
     """Height of the sensor above the centre of mass. The vehicle is not told (EKF2_IMU_POS_Z is 0)."""
+    ahead_of_centre_m: SensorOffset = 0.0
+    """And ahead of it."""
+    right_of_centre_m: SensorOffset = 0.0
+    """And to its right."""
     accelerometer_range_m_s2: Positive
     """Raw samples are clipped here, per axis."""
     accelerometer_noise_m_s2: NotNegative
@@ -141,6 +148,11 @@ class Imu(Part):
     """As `accelerometer_noise_m_s2`, of the angular rate."""
     gyroscope_bias_rad_s: NotNegative
     """As `accelerometer_bias_m_s2`, of the angular rate."""
+
+    @property
+    def place_frd_m(self) -> tuple[float, float, float]:
+        """Of the sensor, from the centre of mass."""
+        return (self.ahead_of_centre_m, self.right_of_centre_m, -self.above_centre_m)
 
     @model_validator(mode="after")
     def _whole_samples(self) -> "Imu":

@@ -53,12 +53,16 @@ def drawn_vehicle(seed: int, kind: str) -> Part:
         },
         "motors": {"max_thrust_n": round(mass_kg * 9.81 / 4 / hover_share, 3), "time_constant_s": lag_s},
         "surface": {"guard_friction": draw.number(*RANGES["friction"])},
-        "imu": _imu(draw) | {"above_centre_m": Draw(seed, _OF_SENSORS).number(*RANGES["imu_above_centre_m"])},
+        "imu": _imu(draw) | _place(Draw(seed, _OF_SENSORS)),
         "estimate": _estimate(draw),
         "control": _control(draw, lag_s),
         # Last: all else is the same for both kinds.
         "arms": _arms(draw, kind, arm_m, guard_m, mass_kg * yaw_m**2),
     }
+
+
+def _place(draw: Draw) -> Part:
+    return {key: draw.number(*RANGES[f"imu_{key}"]) for key in ("above_centre_m", "ahead_of_centre_m", "right_of_centre_m")}
 
 
 def _imu(draw: Draw) -> Part:

@@ -20,6 +20,7 @@ from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, Sensor, 
 from sim_vehicle.estimator.strapdown import FORCE, RATES
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
+from sim_vehicle.physics.record import new_record
 from sim_vehicle.quantities import Floats
 
 # Still for as long as this, and the rates of this long are averaged: their noise is down to a fifth.
@@ -94,7 +95,6 @@ class OnboardEstimator:
         # At least one sample behind, so that the output predictor always has one to go by.
         self._slots = max(math.ceil(sensors.delay_s / self._step_s - 1e-9), 1) + 1
         self._share = 1 - math.exp(-self._step_s / SLOPE_TIME_CONSTANT_S)
-        self._now = np.zeros(strapdown.NOMINAL_ROWS + 3)
         self._clipped = np.zeros(3)
         self.flow: FlowSample | None = None
         self.range: RangeSample | None = None
@@ -113,7 +113,9 @@ class OnboardEstimator:
         self.filter = NavigationFilter(self._airframe, (px, py, pz), (vx, vy, vz), attitude_wxyz)
         self._samples = np.zeros((self._slots, strapdown.SAMPLE_COLUMNS))
         self._samples[:, strapdown.FORCE + 2] = -GRAVITY_M_S2
-        self._head = 0
+        self._head, self._resets_told = 0, self.reset_counter
+        self._output = new_record(strapdown.Output, now=[*self.filter.nominal, 0.0, 0.0, 0.0])
+        self._past = np.tile(self.filter.nominal[: strapdown.GYROSCOPE_BIAS], (self._slots, 1))
         self._waiting: deque[Sample] = deque()
         self._fused_us = dict.fromkeys(_Aided, time_us)
 
@@ -141,8 +143,12 @@ class OnboardEstimator:
         self._fuse_rest(self._samples[oldest], flies, horizon_us)
         while self._waiting and self._waiting[0].time_us <= horizon_us:
             self._fuse(self._waiting.popleft())
-        strapdown.predict_now(self.filter.nominal, self._samples, oldest, self._step_s, self._now)
-        strapdown.show(self._now, self._share, estimate, acceleration_ned_m_s2)
+        nominal, past, output = self.filter.nominal, self._past, self._output
+        strapdown.follow(nominal, self._samples, past, oldest, self._step_s, output)
+        if self._resets_told != self.reset_counter:
+            self._resets_told = self.reset_counter
+            strapdown.jump(nominal, past, oldest, output)
+        strapdown.show(output.now, self._share, estimate, acceleration_ned_m_s2)
 
     def variances(self) -> tuple[float, float, float]:
         """Of position (m2), velocity (m2/s2) and attitude (rad2), each on its worst axis."""

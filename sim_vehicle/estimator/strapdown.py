@@ -7,11 +7,13 @@ biases, integrated flow.
 """
 
 import math
+from typing import Annotated
 
 import numpy as np
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2
+from sim_vehicle.physics.record import Matrix3, Vector3
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise, turn
 from sim_vehicle.quantities import Floats
 
@@ -24,6 +26,8 @@ ERROR_ROWS = 17
 # Columns of an inertial sample: specific force, rates (means, FRD), raw samples clipped.
 FORCE, RATES, CLIPPED = 0, 3, 6
 SAMPLE_COLUMNS = 9
+# EKF2_TAU_VEL and EKF2_TAU_POS.
+TAU_S = 0.25
 
 # The camera never comes closer to the ground than its feet let it; below this the flow would only divide by zero.
 LEAST_DISTANCE_M = 0.05
@@ -163,18 +167,56 @@ def _fill_process(sample: Floats, noise: Floats, rotation: Floats, q: Floats) ->
             q[D_VELOCITY + i, D_VELOCITY + j] = total
 
 
-@njit
-def predict_now(nominal: Floats, samples: Floats, oldest: int, step_s: float, now: Floats) -> None:
-    """The output predictor: ``nominal`` carried through the ring of samples that the filter has not used yet.
+class Output:
+    """What the vehicle is told: the filter's state as of now, without its jumps."""
 
-    ``oldest`` is the row that it used last; ``now`` gets `NOMINAL_ROWS` and the last acceleration (NED).
+    now: Annotated[Floats, (NOMINAL_ROWS + 3,)]  # as ``nominal``, and the last acceleration (NED)
+    added: Annotated[Floats, (6,)]  # to position and velocity, since the start
+    behind: Annotated[Floats, (6,)]  # sum of what they differed by
+    turn: Vector3  # to add to the next sample's
+    rotation: Matrix3  # working memory
+
+
+@njit
+def follow(nominal: Floats, samples: Floats, past: Floats, oldest: int, step_s: float, output: Output) -> None:
+    """The output predictor: carry the output through the newest sample, and lead it towards the filter.
+
+    PX4's (output_predictor.cpp). ``nominal`` is as old as the row ``oldest`` of the two rings: the samples, and the
+    outputs less what was added until then. By what it differs from the output of then all since are corrected: position
+    and velocity within TAU_S, the attitude within twice the delay.
     """
-    rotation = np.empty((3, 3))
-    for i in range(NOMINAL_ROWS):
+    now, added, slots = output.now, output.added, samples.shape[0]
+    newest = (oldest + slots - 1) % slots
+    for i in range(GYROSCOPE_BIAS, NOMINAL_ROWS):
         now[i] = nominal[i]
-    slots = samples.shape[0]
-    for i in range(1, slots):
-        move(now, samples[(oldest + i) % slots], step_s, rotation, now[NOMINAL_ROWS:])
+    turn(now, output.turn[0], output.turn[1], output.turn[2], now)
+    move(now, samples[newest], step_s, output.rotation, now[NOMINAL_ROWS:])
+    for i in range(6):
+        past[newest, i] = now[i] - added[i]
+    for i in range(QUATERNION, GYROSCOPE_BIAS):
+        past[newest, i] = now[i]
+    gain = step_s / TAU_S
+    for i in range(6):
+        behind = nominal[i] - past[oldest, i] - added[i]
+        output.behind[i] += behind
+        change = gain * (behind + 0.1 * gain * output.behind[i])
+        added[i] += change
+        now[i] += change
+    a, b, c, d = nominal[6], nominal[7], nominal[8], nominal[9]
+    w, x, y, z = past[oldest, 6], past[oldest, 7], past[oldest, 8], past[oldest, 9]
+    share = math.copysign(1.0, a * w + b * x + c * y + d * z) / (slots - 1)
+    output.turn[0] = share * (w * b - x * a + z * c - y * d)
+    output.turn[1] = share * (w * c - y * a + x * d - z * b)
+    output.turn[2] = share * (w * d - z * a + y * b - x * c)
+
+
+@njit
+def jump(nominal: Floats, past: Floats, oldest: int, output: Output) -> None:
+    """Move position and velocity to the filter's at once: it was reset."""
+    for i in range(6):
+        change = nominal[i] - past[oldest, i] - output.added[i]
+        output.added[i] += change
+        output.now[i] += change
 
 
 @njit
@@ -189,7 +231,7 @@ def keep_sample(samples: Floats, row: int, sensed: Floats, clipped: Floats) -> N
 
 @njit
 def show(now: Floats, share: float, estimate: Floats, acceleration: Floats) -> None:
-    """Hand on what `predict_now` says: position, velocity and attitude as they are, the acceleration low-passed."""
+    """Hand on what the output predictor says: position, velocity and attitude as they are, the acceleration low-passed."""
     for i in range(GYROSCOPE_BIAS):
         estimate[i] = now[i]
     for i in range(3):

@@ -40,7 +40,7 @@ class EstimateErrors:
     rotation: Matrix3  # working memory
     tilt: Vector3  # the same
     step_s: float
-    imu_above_m: float  # height of the inertial sensor above the centre of mass
+    imu_frd_m: Vector3  # place of the inertial sensor, from the centre of mass
     late_s: float
     frequency_rad_s: float  # 0: nothing is missed
     damping: float
@@ -68,7 +68,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         drive=sigma * np.sqrt(1 - keep**2),
         since_missed_s=CORRECTED_AFTER_S,
         step_s=interval_s,
-        imu_above_m=airframe.imu.above_centre_m,
+        imu_frd_m=np.array(airframe.imu.place_frd_m),
         **clipping,
     )
     return errors, np.tile([*body, 0.0, 0.0, 0.0], (slots, 1))
@@ -110,12 +110,15 @@ def note_what_is_clipped(state: PlantState, errors: EstimateErrors, row: Floats)
         row[i] = state.body[i]
     for i in range(3):
         row[HIDDEN + i] = 0.0
-    if errors.imu_above_m != 0.0:
+    x, y, z = errors.imu_frd_m[0], errors.imu_frd_m[1], errors.imu_frd_m[2]
+    if x != 0.0 or y != 0.0 or z != 0.0:
         # The velocity is that of the sensor, which the vehicle is not told is beside the centre of mass.
         matrix_from_quaternion(state.body, errors.rotation)
-        p, q = state.body[10], state.body[11]
+        p, q, r = state.body[10], state.body[11], state.body[12]
+        moves = (q * z - r * y, r * x - p * z, p * y - q * x)
         for i in range(3):
-            row[3 + i] += errors.imu_above_m * (errors.rotation[i, 1] * p - errors.rotation[i, 0] * q)
+            for j in range(3):
+                row[3 + i] += errors.rotation[i, j] * moves[j]
     if errors.frequency_rad_s > 0.0 and abs(off[0]) + abs(off[1]) + abs(off[2]) >= LEAST_HIDDEN_M_S:
         matrix_from_quaternion(state.body, errors.rotation)
         for i in range(3):

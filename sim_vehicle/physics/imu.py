@@ -21,16 +21,13 @@ def add_raw_sample(
     x = (state.body[3] - velocity_before[0]) / raw_s
     y = (state.body[4] - velocity_before[1]) / raw_s
     z = (state.body[5] - velocity_before[2]) / raw_s - GRAVITY_M_S2
-    # Above the centre of mass the sensor turns with the vehicle.
-    p_rad_s2 = (state.body[10] - scratch.rates_before[0]) / raw_s
-    q_rad_s2 = (state.body[11] - scratch.rates_before[1]) / raw_s
-    above = (-q_rad_s2 * constants.imu_above_m, p_rad_s2 * constants.imu_above_m, 0.0)
+    turned = beside_the_centre_m_s2(constants.imu_frd_m, state.body, scratch.rates_before, raw_s)
     limit = constants.accelerometer_range_m_s2
     shaken = scratch.shaken
     if disturbance.shakes == 1:
         shake(state, raw_s, constants, disturbance, shaken)
     for i in range(3):
-        true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z + above[i]
+        true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z + turned[i]
         seen = (
             true
             + constants.accelerometer_bias_frd_m_s2[i]
@@ -53,6 +50,20 @@ def add_raw_sample(
             + shaken[3 + i]
         )
         state.rate_sum[i] += disturbance.stuck_at[3 + i] if disturbance.stuck[3 + i] == 1 else rate
+
+
+@inlined
+def beside_the_centre_m_s2(place: Floats, body: Floats, before: Floats, raw_s: float) -> tuple[float, float, float]:
+    """By how much more a place (body FRD, m) of a vehicle that turns is accelerated than its centre of mass; ``before``:
+    its rates so long ago."""
+    x, y, z, p, q, r = place[0], place[1], place[2], body[10], body[11], body[12]
+    a, b, c = (p - before[0]) / raw_s, (q - before[1]) / raw_s, (r - before[2]) / raw_s
+    along, square = p * x + q * y + r * z, p * p + q * q + r * r
+    return (
+        b * z - c * y + p * along - square * x,
+        c * x - a * z + q * along - square * y,
+        a * y - b * x + r * along - square * z,
+    )
 
 
 @njit

@@ -106,7 +106,7 @@ class Constants(Gains, ContactSprings):
     motor_idle_n: float
     motor_time_constant_s: float
     moment_per_thrust_m: float
-    imu_above_m: float  # height of the sensor above the centre of mass
+    imu_frd_m: Vector3  # place of the sensor, from the centre of mass
     raw_interval_us: int
     raw_per_interval: int
     accelerometer_range_m_s2: float
@@ -341,7 +341,7 @@ def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
         motor_time_constant_s=motors.time_constant_s,
         moment_per_thrust_m=motors.moment_per_thrust_m,
         raw_interval_us=imu.raw_interval_us,
-        imu_above_m=imu.above_centre_m,
+        imu_frd_m=np.array(imu.place_frd_m),
         raw_per_interval=raw_per_interval,
         accelerometer_range_m_s2=imu.accelerometer_range_m_s2,
         accelerometer_raw_noise_m_s2=imu.accelerometer_noise_m_s2 * math.sqrt(raw_per_interval),

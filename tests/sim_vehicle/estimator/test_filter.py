@@ -13,7 +13,17 @@ from sim_vehicle.control.setpoint import TrajectorySetpoint
 from sim_vehicle.estimator import strapdown
 from sim_vehicle.estimator.optics import distance_below
 from sim_vehicle.estimator.sensors import FlowSensor
-from sim_vehicle.estimator.strapdown import ERROR_ROWS, SAMPLE_COLUMNS, advance, down_range, heading, predict_now
+from sim_vehicle.estimator.strapdown import (
+    ERROR_ROWS,
+    QUATERNION,
+    SAMPLE_COLUMNS,
+    VELOCITY,
+    advance,
+    down_range,
+    heading,
+)
+from sim_vehicle.physics.layout import GRAVITY_M_S2
+from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.world import build_world, plate
 from tests.sim_vehicle.estimator.flying import HOVER, WITH_CAMERAS, Flight, circle, filtered, hit_wall
@@ -77,17 +87,46 @@ def test_each_measurements_row_is_its_derivative(measure) -> None:
         assert (plus - minus) / 2e-6 == pytest.approx(row[column], abs=1e-6)
 
 
-def test_the_output_predictor_brings_the_state_through_the_samples_not_used_yet() -> None:
-    # Given a filter three samples behind, and a ring in which the oldest row is the one it used last
-    samples = np.tile(some_sample(), (4, 1))
-    samples[:, 0] = [0.5, 1.0, 1.5, 2.0]
-    now, expected = np.empty(strapdown.NOMINAL_ROWS + 3), tilted()
-    # When its state is carried to now
-    predict_now(tilted(), samples, 1, STEP_S, now)
-    # Then it is where the filter will be once it has used them, in order
-    for row in (2, 3, 0):
-        expected, _, _ = advanced(expected, samples[row])
-    assert now[:10] == pytest.approx(expected[:10], abs=1e-12)
+def output_beside_the_filter(samples, corrections=()):
+    """The output's state after each sample, of a filter three samples behind that is corrected before some of them."""
+    nominal = np.zeros(strapdown.NOMINAL_ROWS)
+    nominal[QUATERNION] = 1.0
+    output = new_record(strapdown.Output, now=[*nominal, 0.0, 0.0, 0.0])
+    past, ring, shown = np.tile(nominal[:10], (4, 1)), np.zeros((4, SAMPLE_COLUMNS)), []
+    ring[:, 2] = -GRAVITY_M_S2
+    for step, sample in enumerate(samples):
+        ring[step % 4] = sample
+        oldest = (step + 1) % 4
+        nominal = advanced(nominal, ring[oldest])[0]
+        for row, change in dict(corrections).get(step, {}).items():
+            nominal[row] += change
+        strapdown.follow(nominal, ring, past, oldest, STEP_S, output)
+        shown.append(output.now[:10].copy())
+    return np.array(shown)
+
+
+def test_the_output_is_where_the_filter_will_be_once_it_has_used_all_samples() -> None:
+    samples = np.tile(some_sample(), (12, 1))
+    samples[:, 0] = np.linspace(-1.0, 1.0, 12)
+    expected = np.zeros(strapdown.NOMINAL_ROWS)
+    expected[QUATERNION] = 1.0
+    for sample in samples:
+        expected = advanced(expected, sample)[0]
+    assert output_beside_the_filter(samples)[-1] == pytest.approx(expected[:10], abs=1e-12)
+
+
+def test_what_corrects_the_filter_reaches_the_output_without_a_jump() -> None:
+    # Given a vehicle at rest, whose filter is moved by 0.4 m/s, and turned by 0.02 rad
+    still = np.zeros((150, SAMPLE_COLUMNS))
+    still[:, 2] = -GRAVITY_M_S2
+    shown = output_beside_the_filter(still, {20: {VELOCITY: 0.4, QUATERNION + 3: 0.01}}.items())
+    # Then the velocity follows in PX4's 0.25 s, the heading in twice the delay
+    speed, heading_rad = shown[:, VELOCITY], 2.0 * shown[:, QUATERNION + 3]
+    assert speed[20] == pytest.approx(0.4 * STEP_S / 0.25, rel=0.01)
+    assert speed[20 + 62] == pytest.approx(0.4 * (1.0 - math.exp(-1.0)), rel=0.1)
+    assert heading_rad[20] == 0.0
+    assert heading_rad[20 + 6] == pytest.approx(0.02, rel=0.4)
+    assert heading_rad[-1] == pytest.approx(0.02, rel=0.01)
 
 
 INTERVAL_US = 4_000
@@ -220,14 +259,14 @@ def test_position_by_flow_drifts_and_by_cameras_does_not_and_the_gyroscopes_bias
 
 
 def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():
-    flight, (before, clipped, seen, later) = hit_wall(filtered(), 4.0, after_ms=(48, 200, 1000))
+    flight, (before, clipped, seen, later) = hit_wall(filtered(), 4.0, after_ms=(48, 200, 600))
     # Given a hit that the accelerometer could not follow
     assert flight.output.clipping_counts[0] > 10
     assert before < 0.1
-    # Then the velocity is wrong by what was clipped, until the next flow samples
-    assert clipped > 0.3
-    assert seen < 0.15
-    assert later < 0.1
+    # Then the velocity is wrong by what was clipped, and is put right within the output predictor's quarter of a second
+    assert clipped > 1.5
+    assert 0.4 * clipped < seen < 0.8 * clipped
+    assert later < 0.15 * clipped
     assert flight.output.reset_counter == 0
 
 
@@ -254,7 +293,7 @@ def test_cameras_that_are_turned_down_for_a_second_reset_the_position():
     # Given a rigid hit seen by cameras alone, by a filter that allows next to nothing for clipping
     only = {name: {"fitted": False} for name in ("optical_flow", "range_finder", "compass")}
     changes = {"sensors": {**only, "motion_capture": {"fitted": True}}, "estimator": {"clipped_excess_m_s2": 4.9}}
-    flight, (_, astray, later) = hit_wall(filtered("rigid", changes), 2.0, after_ms=(800, 3000))
+    flight, (_, astray, later) = hit_wall(filtered("rigid", changes), 2.0, after_ms=(800, 5000))
     # Then its position runs away from the cameras', which its gate turns down, until it is reset to them
     assert astray > 1.0
     assert later < 0.1
