@@ -62,7 +62,9 @@ def drawn_vehicle(seed: int, kind: str) -> Part:
 
 
 def _place(draw: Draw) -> Part:
-    return {key: draw.number(*RANGES[f"imu_{key}"]) for key in ("above_centre_m", "ahead_of_centre_m", "right_of_centre_m")}
+    return {
+        key: draw.number(*RANGES[f"imu_{key}"]) for key in ("above_centre_m", "ahead_of_centre_m", "right_of_centre_m")
+    }
 
 
 def _imu(draw: Draw) -> Part:

@@ -231,7 +231,7 @@ def keep_sample(samples: Floats, row: int, sensed: Floats, clipped: Floats) -> N
 
 @njit
 def show(now: Floats, share: float, estimate: Floats, acceleration: Floats) -> None:
-    """Hand on what the output predictor says: position, velocity and attitude as they are, the acceleration low-passed."""
+    """Hand the output on: position, velocity and attitude as they are, the acceleration low-passed."""
     for i in range(GYROSCOPE_BIAS):
         estimate[i] = now[i]
     for i in range(3):

@@ -166,7 +166,7 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
             case float():
                 return value * math.exp(chance.uniform(-math.log(3.0), math.log(3.0)))
             case dict():
-                return {key: varied(part) for key, part in value.items() if key != "above_centre_m"}
+                return {key: varied(part) for key, part in value.items() if not key.endswith("_centre_m")}
         return type(value)(map(varied, value))
 
     drawn = load_built_in(chance.choice(built_in_airframes())).model_dump()
@@ -186,6 +186,7 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
     control["position_p_per_s"] = chance.uniform(0.1, 0.5) * p
     rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
     drawn["imu"]["above_centre_m"] = chance.uniform(-0.02, 0.05)
+    drawn["imu"]["ahead_of_centre_m"] = chance.uniform(-0.02, 0.07)
     return drawn | {"rotors": rotors}
 
 

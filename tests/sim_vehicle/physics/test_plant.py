@@ -127,10 +127,23 @@ def test_a_sensor_above_the_centre_shows_force_and_velocity_of_its_own() -> None
     p, q = plant.state.body[10:12] - before
     force = sum(np.array(output.specific_force_frd_m_s2) for output in outputs) * 0.004
     assert abs(q) > 0.3
-    assert force[:2] == pytest.approx([-0.05 * q, 0.05 * p], rel=1e-3)
+    assert force[:2] == pytest.approx([-0.05 * q, 0.05 * p], rel=2e-3)
     moved = outputs[-1].velocity_ned_m_s - plant.truth.series()["velocity_ned_m_s"][start + len(outputs) - 6]
     p, q, _ = outputs[-6].angular_velocity_frd_rad_s
     assert moved[:2] == pytest.approx([-0.05 * q, 0.05 * p], rel=0.1)
+
+
+def test_a_sensor_beside_the_centre_shows_that_the_vehicle_spins() -> None:
+    # Given a vehicle that spins at 8 rad/s, and its sensor 5 cm ahead of the centre and 2 cm to the right
+    plant = hovering(quiet(load_built_in("foldable"), imu__ahead_of_centre_m=0.05, imu__right_of_centre_m=0.02))
+    plant.state.body[12] = 8.0
+    # When that is braked
+    (output,) = flown(plant, at(0, 0, -2), 0.004)
+    # Then the sensor is held on its circle, and braked along it
+    braked = (plant.state.body[12] - 8.0) / 0.004
+    assert braked < -0.5
+    expected = [-0.05 * 64.0 - 0.02 * braked, -0.02 * 64.0 + 0.05 * braked]
+    assert output.specific_force_frd_m_s2[:2] == pytest.approx(expected, abs=0.02)
 
 
 def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
