@@ -1,10 +1,12 @@
-"""What free flight teaches: the noise of the specific force on each axis, and the specific force of full thrust."""
+"""What free flight teaches: the noise of the specific force on each axis, where the accelerometer is, and the specific
+force of full thrust."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from companion.messages import Vector3
-from companion.motion.config import CURRENT_US
+from companion.motion.config import CURRENT_US, LONGEST_GAP_US, MOTORS_RAD_S2
+from companion.motion.slope import Slope
 from companion.motion.vector import ZERO
 from companion.reflex import config as reflex
 
@@ -39,6 +41,57 @@ class ForceNoise:
         self.variance_m2_s4 = (v_x, v_y, v_z)
         self.side_m_s2 = grown * math.sqrt(max(v_x, v_y, reflex.LEAST_SIDE_SHARE**2 * v_z))
         self.vertical_m_s2 = grown * math.sqrt(v_z)
+
+
+@dataclass(slots=True)
+class Lever:
+    """Where the accelerometer is, from the point that the vehicle turns about. Changed only by its methods.
+
+    With the rates p, q, r it is accelerated by h (-q' - p r, p' - q r) at a height h above that point, and by up to
+    d (p^2 + q^2 + r^2) at a distance d beside it. The height is learnt, the distance is not.
+    """
+
+    below_m: float = 0.0
+    height_error_m: float = reflex.LEVER_M  # standard deviation
+    above_per_s2: tuple[float, float] = (0.0, 0.0)  # of each metre of height, body x and y; none across a gap
+    error_m_s2: float = 0.0  # standard deviation of the sideways force of a sample, by what is not known of the place
+    unseen_m_s2: float = 0.0  # what it is off by at most, if the rates changed while the accelerometer measured alone
+    turns_rad_s2: float = 0.0  # for RATE_MEMORY_US
+    _lasting_per_s2: tuple[float, float] = (0.0, 0.0)  # mean of `above_per_s2` over that time
+    _rates_rad_s: Vector3 = ZERO
+    _slope: Slope = field(default_factory=lambda: Slope(0.0, reflex.LEVER_M, -math.inf, math.inf))
+
+    def at_centre(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> Vector3:
+        """Take force and rates (FRD) of a sample, the mean of `averaging_us`, so long after the one before it; the
+        force that there is at the point that the vehicle turns about."""
+        (p, q, r), (a, b), (m, n), self._rates_rad_s = self._rates_rad_s, self.above_per_s2, self._lasting_per_s2, w
+        if not 0 < elapsed_us < LONGEST_GAP_US:
+            self.above_per_s2 = self._lasting_per_s2 = (0.0, 0.0)
+            self.error_m_s2 = self.unseen_m_s2 = self.turns_rad_s2 = 0.0
+            return f
+        i, j, per_s = w[0] - p, w[1] - q, 1e6 / elapsed_us
+        # Rates of before: a hit has not changed them. What no motor makes is none: of one forged rate it is little.
+        x, y = -j * per_s - p * r - a, i * per_s - q * r - b
+        share = min(1.0, MOTORS_RAD_S2 / max(math.hypot(x, y), 1.0))
+        a, b = self.above_per_s2 = (a + share * x, b + share * y)
+        turns_rad_s2, within_rad_s2 = math.hypot(a, b), 1e6 * math.hypot(i, j) / averaging_us
+        beside_m_s2 = reflex.LEVER_M * (p * p + q * q + r * r)
+        self.error_m_s2 = math.hypot(self.height_error_m * turns_rad_s2, beside_m_s2)
+        self.unseen_m_s2 = abs(self.below_m) * max(0.0, min(within_rad_s2, MOTORS_RAD_S2) - turns_rad_s2)
+        share = min(1.0, elapsed_us / reflex.RATE_MEMORY_US)
+        m, n = self._lasting_per_s2 = (m + share * (a - m), n + share * (b - n))
+        self.turns_rad_s2 = math.hypot(m, n)
+        return (f[0] + self.below_m * a, f[1] + self.below_m * b, f[2])
+
+    def learn(self, off_frd_m_s2: Vector3, variance: float) -> None:
+        """Take by how much the newest sample of a free vehicle that turns, as of that point, is off the mean.
+
+        `variance`: of that.
+        """
+        (a, b), (m, n) = self.above_per_s2, self._lasting_per_s2
+        as_shown = (off_frd_m_s2[0] - self.below_m * a, off_frd_m_s2[1] - self.below_m * b, 0.0)
+        self._slope.learn(as_shown, (a, b, 0.0), (m, n, 0.0))
+        self.below_m, self.height_error_m = self._slope.found(variance)
 
 
 @dataclass(slots=True)

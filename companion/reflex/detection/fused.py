@@ -24,7 +24,6 @@ from typing import ClassVar
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import ned_to_body
-from companion.motion.slope import Slope
 from companion.motion.vector import ZERO, along, limited, minus, plus, towards, unit
 from companion.reflex import config as reflex
 from companion.reflex.detection.classify import classified, hovers
@@ -39,7 +38,7 @@ from companion.reflex.detection.detector import (
     Phase,
     Situation,
 )
-from companion.reflex.detection.free_flight import ForceNoise
+from companion.reflex.detection.free_flight import ForceNoise, Lever
 from companion.reflex.detection.jumps import RateJump, VelocityJump
 
 
@@ -56,9 +55,7 @@ class FusedState(DetectorState):
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
-    lever: Slope = field(default_factory=lambda: Slope(0.0, reflex.LEVER_M, -math.inf, math.inf))
-    below_m: float = 0.0  # by the lever: how far the accelerometer is below the point that the vehicle turns about
-    below_error_m: float = reflex.LEVER_M  # its standard deviation
+    lever: Lever = field(default_factory=Lever)
     jump: VelocityJump = field(default_factory=VelocityJump)
     velocity_ned_m_s: Vector3 | None = None
     moved_boot_us: int = 0
@@ -75,9 +72,9 @@ class FusedState(DetectorState):
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
     def side_threshold_m_s2(self, config: reflex.FusedConfig) -> float:
-        """Horizontal threshold, m/s^2. In a turn the lever's error adds to the noise."""
-        turned_m_s2 = config.noise_factor * self.below_error_m * math.hypot(*self.turn.above_frd_per_s2)
-        return math.hypot(self.threshold_m_s2, turned_m_s2)
+        """Horizontal threshold, m/s^2. In a turn what is not known of the accelerometer's place adds to the noise."""
+        turned_m_s2 = config.noise_factor * self.lever.error_m_s2
+        return math.hypot(self.threshold_m_s2, turned_m_s2) + self.lever.unseen_m_s2
 
     def side_force(self, config: reflex.FusedConfig, f: Vector3) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
@@ -149,9 +146,9 @@ class FusedDetector:
     def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
             before_us, now_us = state.last_sample_boot_us, sample.time_boot_us
-            state.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, self._config)
-            (x, y, z), (a, b, _), below_m = sample.specific_force_frd_m_s2, state.turn.above_frd_per_s2, state.below_m
-            force_frd_m_s2 = (x + below_m * a, y + below_m * b, z)
+            f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+            state.turn.imu(before_us, now_us, w, self._config)
+            force_frd_m_s2 = state.lever.at_centre(now_us - before_us, f, w, self._averaging_us)
             impact = self._imu(state, sample, force_frd_m_s2, situation, motion)
             state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, force_frd_m_s2
             return impact
@@ -246,10 +243,8 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
-            if s.turn.lasting_rad_s2 > reflex.TURNS_RAD_S2:
-                above = s.turn.above_frd_per_s2
-                s.lever.learn(plus(minus(f, s.floor.mean_frd_m_s2), -s.below_m, above), above)
-                s.below_m, s.below_error_m = s.lever.found(s.floor.side_m_s2**2)
+            if s.lever.turns_rad_s2 > reflex.TURNS_RAD_S2:
+                s.lever.learn(minus(f, s.floor.mean_frd_m_s2), s.floor.side_m_s2**2)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2

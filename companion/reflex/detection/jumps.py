@@ -33,10 +33,6 @@ class RateJump(Innovation):
     step_rad_s: Vector3 = ZERO
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
-    above_frd_per_s2: Vector3 = ZERO
-    """What each metre above the point that the vehicle turns about is accelerated by, (-q', p', 0): by the angular
-    acceleration of roll and pitch up to the newest sample, as far as motors make it; none across a gap."""
-    lasting_rad_s2: float = 0.0  # that angular acceleration in the mean of RATE_MEMORY_US; 0 where no motor makes it
     variance_rad2_s2: float = 0.0
     shown: float = 0.0
     """The largest ratio of late: an estimator that has missed a hit shows it later than the gyroscopes."""
@@ -50,10 +46,6 @@ class RateJump(Innovation):
         was_us = self.over_us if 0 < self.over_us < LONGEST_GAP_US else LONGEST_GAP_US
         self.newest_rad_s, self.over_us = (p, q, r), time_us - before_us
         self.step_rad_s = i, j, k = p - x, q - y, r - z
-        per_s = 1e6 / (reflex.ACROSS_THRUST * self.over_us) if 0 < self.over_us < LONGEST_GAP_US else 0.0
-        most_per_s = MOTORS_RAD_S2 / (math.hypot(i, j) or 1.0)
-        is_by_motors, per_s = per_s <= most_per_s, min(per_s, most_per_s)
-        self.above_frd_per_s2 = (-j * per_s, i * per_s, 0.0)
         on = a * i + b * j + c * k
         # The one between is the middle one, unless the newest step goes back: behind where the last began, or less far.
         if on < 0.0:
@@ -65,8 +57,6 @@ class RateJump(Innovation):
             share = max(0.0, 1.0 - braked_rad_s / math.sqrt(a * a + b * b + c * c))
             x, y, z = x - share * a, y - share * b, z - share * c
         (m, n, o), share, least = self.mean_rad_s, was_us / reflex.RATE_MEMORY_US, config.rate_step_rad_s
-        lasting_rad_s = math.hypot(p - m, q - n) if is_by_motors else 0.0
-        self.lasting_rad_s2 = lasting_rad_s / (reflex.ACROSS_THRUST * 1e-6 * reflex.RATE_MEMORY_US)
         i, j, k = x - m, y - n, z - o
         if share >= 1.0:
             self.mean_rad_s, least = (x, y, z), least * share

@@ -279,7 +279,7 @@ def rolling(rad_s2, from_us=1_500_000, turns_rad_s=6e-6 * math.pi):
 @pytest.mark.parametrize("above_m", [0.08, -0.05])
 def test_what_a_sensor_beside_the_centre_shows_of_a_turn_is_no_hit_and_a_push_then_is(above_m):
     # Given a vehicle that rolls, its sensor above the centre or below, and a push of 4 m/s^2
-    turned, rates = rolling(60.0)
+    turned, rates = rolling(60.0, turns_rad_s=12e-6 * math.pi)
 
     def push(t_us):
         return (0.0, above_m * turned(t_us) + (4.0 if t_us >= HIT_US else 0.0), 0.0)
@@ -287,7 +287,7 @@ def test_what_a_sensor_beside_the_centre_shows_of_a_turn_is_no_hit_and_a_push_th
     flight = Flight(push, rates=rates, heard=(Attitude, AttitudeTarget))
     # When it flies on, then the push alone is a hit, in its first whole sample; where the sensor is has been learnt
     assert [i.sample_time_boot_us for i in flight.fly(3_500_000)] == [pytest.approx(HIT_US + 4_000, abs=4_000)]
-    assert flight.state.below_m == pytest.approx(-above_m, abs=0.01)
+    assert flight.state.lever.below_m == pytest.approx(-above_m, abs=0.01)
 
 
 @pytest.mark.parametrize(("rad_s2", "is_known"), [(8.0, False), (15.0, True)])
@@ -296,7 +296,9 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
 ):
     flight = Flight(rates=rolling(rad_s2)[1], heard=(Attitude, AttitudeTarget))
     assert flight.fly(3_500_000) == []
-    flight.state.turn.above_frd_per_s2, flight.state.threshold_m_s2 = (36.0, 48.0, 0.0), 1.75
+    flight.state.threshold_m_s2 = 1.75
+    for rate_rad_s in (0.0, 0.0, 0.24):
+        flight.state.lever.at_centre(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
     most_m_s2 = 1.9 if is_known else math.hypot(1.75, 4.2 * 0.05 * 60.0)
     assert flight.state.side_threshold_m_s2(FusedConfig()) == pytest.approx(most_m_s2, rel=0.1)
 

@@ -1,0 +1,98 @@
+"""Where the accelerometer is: what a turn shows there is allowed for, and its height is learnt; on a rigid body."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from companion.reflex.config import FusedConfig
+from companion.reflex.detection.free_flight import Lever
+
+WINDOW_US = 4_000
+STEPS = 4  # of a window
+
+
+class Turning:
+    """It turns about x and y in bursts (rad/s^2), and about z evenly; its sensor is at a place (FRD, m)."""
+
+    def __init__(self, place_m, burst_rad_s2, every_us=WINDOW_US, yaw_rad_s=0.0, noise_rad_s=0.0):
+        self.place_m, self.burst_rad_s2, self.every_us = np.array(place_m), burst_rad_s2, every_us
+        self.rates = np.array([0.0, 0.0, yaw_rad_s])
+        self.noise_rad_s, self.rng = noise_rad_s, random.Random(2)
+
+    def _turns_rad_s2(self, t_s):
+        # To and fro: motors take 30 ms from one to the other.
+        burst = self.burst_rad_s2 * math.sin(2.0 * math.pi * t_s / 0.25) ** 3
+        return np.array([0.6 * burst, -0.8 * burst, 0.0])
+
+    def samples(self, until_s):
+        """Force and rates, each the mean of a window."""
+        step_s, kept = 1e-6 * WINDOW_US / STEPS, []
+        for step in range(1, round(until_s / step_s)):
+            turns = self._turns_rad_s2(step * step_s)
+            self.rates = self.rates + step_s * turns
+            force = np.cross(turns, self.place_m) + np.cross(self.rates, np.cross(self.rates, self.place_m))
+            kept = [*kept[1 - STEPS :], (force, self.rates)]
+            if step % (STEPS * self.every_us // WINDOW_US) == 0:
+                f, w = np.mean(kept, axis=0)
+                yield tuple(f.tolist()), tuple(rate + self.rng.gauss(0.0, self.noise_rad_s) for rate in w.tolist())
+
+    def fly(self, lever, until_s):
+        """The sideways force at the centre, and from where on that is a hit, m/s^2."""
+        config = FusedConfig()
+        for f, w in self.samples(until_s):
+            x, y, _ = lever.at_centre(self.every_us, f, w, WINDOW_US)
+            turned_m_s2 = config.noise_factor * lever.error_m_s2
+            yield math.hypot(x, y), math.hypot(config.side_threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
+            if lever.turns_rad_s2 > 10.0:
+                lever.learn((x, y, 0.0), 0.25)
+
+
+@pytest.mark.parametrize(
+    ("place_m", "burst_rad_s2", "every_us", "yaw_rad_s"),
+    [
+        ((0.0, 0.0, -0.08), 60.0, WINDOW_US, 0.0),
+        ((0.0, 0.0, -0.08), 160.0, WINDOW_US, 0.0),  # more than most motors make
+        ((0.0, 0.0, -0.08), 95.0, 5 * WINDOW_US, 0.0),  # most of it is between the samples
+        ((0.06, 0.02, 0.0), 30.0, WINDOW_US, 6.0),
+        ((0.05, 0.0, -0.05), 60.0, 2 * WINDOW_US, 3.0),
+    ],
+)
+def test_what_a_turn_shows_beside_the_centre_is_no_hit(place_m, burst_rad_s2, every_us, yaw_rad_s):
+    lever = Lever()
+    shown = list(Turning(place_m, burst_rad_s2, every_us, yaw_rad_s).fly(lever, 6.0))
+    assert max(size / limit for size, limit in shown[1:]) < 0.9
+    assert lever.below_m == pytest.approx(place_m[2], abs=0.015)
+
+
+def test_a_turn_about_two_axes_at_once_is_taken_off_once_the_height_is_known() -> None:
+    rates = np.array([3.0, -2.0, 4.0])
+    force = tuple(np.cross(rates, np.cross(rates, (0.0, 0.0, -0.1))).tolist())
+    assert math.hypot(*force[:2]) > 1.4
+    lever = Lever(below_m=-0.1)
+    x, y, _ = [lever.at_centre(WINDOW_US, force, tuple(rates.tolist()), WINDOW_US) for _ in range(60)][-1]
+    assert math.hypot(x, y) < 1e-6
+
+
+@pytest.mark.parametrize("noise_rad_s", [0.005, 0.03])
+def test_the_height_is_learnt_however_noisy_the_gyroscopes_are(noise_rad_s):
+    lever, turning = Lever(), Turning((0.0, 0.0, -0.07), 40.0, noise_rad_s=noise_rad_s)
+    assert len(list(turning.fly(lever, 12.0))) > 0
+    assert lever.below_m == pytest.approx(-0.07, rel=0.1)
+    assert lever.height_error_m < 0.01
+
+
+def test_one_forged_rate_makes_little_of_a_force_and_none_after_it() -> None:
+    lever = Lever(below_m=-0.05)
+    rates = [(0.0, 0.0, 0.0)] * 5 + [(30.0, 0.0, 0.0)] + [(0.0, 0.0, 0.0)] * 5
+    shown = [math.hypot(*lever.at_centre(WINDOW_US, (0.0, 0.0, -9.8), rate, WINDOW_US)[:2]) for rate in rates]
+    assert shown[5] == pytest.approx(0.05 * 100.0)
+    assert max(shown[:5] + shown[6:]) < 0.1
+
+
+def test_across_a_gap_nothing_is_known_of_a_turn() -> None:
+    lever = Lever(below_m=-0.05)
+    lever.at_centre(WINDOW_US, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0), WINDOW_US)
+    assert lever.at_centre(200_000, (1.0, 0.0, -9.8), (3.0, 2.0, 1.0), WINDOW_US) == (1.0, 0.0, -9.8)
+    assert (lever.error_m_s2, lever.unseen_m_s2, lever.turns_rad_s2) == (0.0, 0.0, 0.0)
