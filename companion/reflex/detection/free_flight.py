@@ -69,15 +69,17 @@ class Lever:
             self.above_per_s2 = self._lasting_per_s2 = (0.0, 0.0)
             self.error_m_s2 = self.unseen_m_s2 = self.turns_rad_s2 = 0.0
             return f
-        i, j, per_s = w[0] - p, w[1] - q, 1e6 / elapsed_us
+        per_s = 1e6 / elapsed_us
         # Rates of before: a hit has not changed them. What no motor makes is none: of one forged rate it is little.
-        x, y = -j * per_s - p * r - a, i * per_s - q * r - b
-        share = min(1.0, MOTORS_RAD_S2 / max(math.hypot(x, y), 1.0))
+        x, y = (q - w[1]) * per_s - p * r - a, (w[0] - p) * per_s - q * r - b
+        changes = math.hypot(x, y)
+        share = min(1.0, MOTORS_RAD_S2 / max(changes, 1.0))
         a, b = self.above_per_s2 = (a + share * x, b + share * y)
-        turns_rad_s2, within_rad_s2 = math.hypot(a, b), 1e6 * math.hypot(i, j) / averaging_us
+        # That may all have come while the accelerometer measured.
+        unseen = share * changes * max(0.0, 1.0 - averaging_us / elapsed_us)
         beside_m_s2 = reflex.LEVER_M * (p * p + q * q + r * r)
-        self.error_m_s2 = math.hypot(self.height_error_m * turns_rad_s2, beside_m_s2)
-        self.unseen_m_s2 = abs(self.below_m) * max(0.0, min(within_rad_s2, MOTORS_RAD_S2) - turns_rad_s2)
+        self.error_m_s2 = math.hypot(self.height_error_m * (math.hypot(a, b) + unseen), beside_m_s2)
+        self.unseen_m_s2 = abs(self.below_m) * unseen
         share = min(1.0, elapsed_us / reflex.RATE_MEMORY_US)
         m, n = self._lasting_per_s2 = (m + share * (a - m), n + share * (b - n))
         self.turns_rad_s2 = math.hypot(m, n)
