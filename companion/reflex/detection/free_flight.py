@@ -54,8 +54,8 @@ class Lever:
     below_m: float = 0.0
     height_error_m: float = reflex.LEVER_M  # standard deviation
     above_per_s2: tuple[float, float] = (0.0, 0.0)  # of each metre of height, body x and y; none across a gap
-    error_m_s2: float = 0.0  # standard deviation of the sideways force of a sample, by what is not known of the place
-    unseen_m_s2: float = 0.0  # what it is off by at most, if the rates changed while the accelerometer measured alone
+    error_m_s2: float = 0.0  # standard deviation of the sideways force of a sample, by that of the height
+    unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     turns_rad_s2: float = 0.0  # for RATE_MEMORY_US
     _lasting_per_s2: tuple[float, float] = (0.0, 0.0)  # mean of `above_per_s2` over that time
     _rates_rad_s: Vector3 = ZERO
@@ -77,9 +77,8 @@ class Lever:
         a, b = self.above_per_s2 = (a + share * x, b + share * y)
         # That may all have come while the accelerometer measured.
         unseen = share * changes * max(0.0, 1.0 - averaging_us / elapsed_us)
-        beside_m_s2 = reflex.LEVER_M * (p * p + q * q + r * r)
-        self.error_m_s2 = math.hypot(self.height_error_m * (math.hypot(a, b) + unseen), beside_m_s2)
-        self.unseen_m_s2 = abs(self.below_m) * unseen
+        self.error_m_s2 = self.height_error_m * math.hypot(a, b)
+        self.unseen_m_s2 = abs(self.below_m) * unseen + reflex.LEVER_M * (p * p + q * q + r * r)
         share = min(1.0, elapsed_us / reflex.RATE_MEMORY_US)
         m, n = self._lasting_per_s2 = (m + share * (a - m), n + share * (b - n))
         self.turns_rad_s2 = math.hypot(m, n)
