@@ -184,9 +184,7 @@ class FusedDetector:
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
-            turn, velocity = s.turn.value / s.turn.limit, s.velocity.value / s.velocity.limit
-            other = max(ratio, s.force_before[0], velocity)
-            return self._turned(s, earlier_us, situation, motion) if turn * turn + other * other > 1.0 else None
+            return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         force = minus(f, s.free_frd_m_s2)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
@@ -209,7 +207,6 @@ class FusedDetector:
         before = motion.history.before(free_until_us + 1) if math.isfinite(motion.left_m_s) else None
         is_again = free_until_us - s.last_loud_boot_us < 1e6 * self._config.rearm_quiet_s
         if s.phase is not Phase.ARMED or is_again or before is None or s.may_be_hand(now_us):
-            s.turn.value = s.turn.shown = 0.0  # of a velocity that jumps then, it is no sign either
             return None
         push = plus(ZERO, -1e6 / (now_us - free_until_us), before.velocity_ned_m_s)
         impact = Impact(
@@ -310,10 +307,10 @@ class FusedDetector:
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit
         # What is not of one moment adds to a jump, and not to each other.
-        other = max(s.turn.shown, s.force[0], s.force_before[0])
+        other = max(s.force[0], s.force_before[0])
         is_weak = ratio <= 1.0 < math.hypot(ratio, other) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
-        is_jump = ratio > 1.0 or both is not None or (is_weak and math.hypot(ratio, s.turn.shown) > 1.0)
+        is_jump = ratio > 1.0 or both is not None
         if s.phase is not Phase.ARMED or not is_jump:
             # What is told as a hit is no noise.
             if is_jump or motion.is_valid:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from companion.messages import Vector3
-from companion.motion.config import DELAY_S, LATEST_S, LONGEST_GAP_US, MEMORY_STEPS, MOTORS_RAD_S2, SHOWN_US
+from companion.motion.config import DELAY_S, LATEST_S, LONGEST_GAP_US, MEMORY_STEPS, MOTORS_RAD_S2
 from companion.motion.slope import Slope
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
@@ -34,9 +34,6 @@ class RateJump(Innovation):
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
     variance_rad2_s2: float = 0.0
-    shown: float = 0.0
-    """The largest ratio of late: an estimator that has missed a hit shows it later than the gyroscopes."""
-    shown_us: int = 0
 
     def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3, config: reflex.FusedConfig) -> None:
         """Take one sample; the one before it was at `before_us`."""
@@ -67,8 +64,6 @@ class RateJump(Innovation):
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
         self.variance_rad2_s2 += was_us / (1e6 * reflex.MEMORY_S + was_us) * (learnt * learnt - self.variance_rad2_s2)
-        if size >= self.shown * limit or not 0 <= time_us - self.shown_us <= SHOWN_US:
-            self.shown, self.shown_us = size / limit, time_us
 
 
 @dataclass(slots=True)

@@ -55,7 +55,7 @@ class Turning:
         ((0.0, 0.0, -0.08), 60.0, WINDOW_US, 0.0),
         ((0.0, 0.0, -0.08), 160.0, WINDOW_US, 0.0),  # more than most motors make
         ((0.0, 0.0, -0.08), 95.0, 5 * WINDOW_US, 0.0),  # most of it is between the samples
-        ((0.06, 0.02, 0.0), 30.0, WINDOW_US, 6.0),
+        ((0.05, 0.01, 0.0), 30.0, WINDOW_US, 6.0),
         ((0.05, 0.0, -0.05), 60.0, 2 * WINDOW_US, 3.0),
     ],
 )
