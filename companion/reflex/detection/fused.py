@@ -8,7 +8,8 @@ contact, each compared with this vehicle's own flight:
   free fall, a dropped payload and every manoeuvre stay inside;
 * the body rates jump, and stay, or the velocity jumps and the accelerometer does not show it (see `jumps`).
 
-Both jumps follow a contact of which the samples hold a part at most: two signs below their limits add up, by squares.
+A velocity jump follows a contact of which the samples hold a part at most: a force below its limit adds to it, by
+squares.
 
 A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
 push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
@@ -306,9 +307,8 @@ class FusedDetector:
         corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit
-        # What is not of one moment adds to a jump, and not to each other.
-        other = max(s.force[0], s.force_before[0])
-        is_weak = ratio <= 1.0 < math.hypot(ratio, other) and not s.may_be_hand(time_us)
+        felt = max(s.force[0], s.force_before[0])
+        is_weak = ratio <= 1.0 < math.hypot(ratio, felt) and not s.may_be_hand(time_us)
         both = s.both(ratio, ned_to_body(strapdown.valid_wxyz, step)) if is_weak else None
         is_jump = ratio > 1.0 or both is not None
         if s.phase is not Phase.ARMED or not is_jump:

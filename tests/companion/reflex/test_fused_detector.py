@@ -154,7 +154,6 @@ def at_once(yaw=0.0, roll=0.0, pitch=0.0):
         # Motors brake it
         (lambda t: (5.0 if HIT_US < t < 3_030_000 else 3.0 if t > HIT_US else 0.0, 0.0, 0.0), {}, 1),
         (at_once(-1.0), {}, 0),
-        (at_once(-1.0), {"push": pulse((0.0, 2.0, 0.0), 3_016_500, 4_000)}, 1),
         # It has stopped the vehicle by then
         (at_once(1.4), {"is_filtered": True, "jump": (3_002_000, (-0.7, 0.0, 0.0), 0)}, 1),
         # A broken sample after a step the other way, one before a gap, motors that turn it all they can, vibration
@@ -187,22 +186,6 @@ def test_a_contact_of_many_samples_turns_a_vehicle_faster_than_motors_do(turns_r
 
     impacts = Flight(imu_every_us=4_000, velocity=(1.0, 0.0, 0.0), rates=contact).fly(until_us=3_150_000)
     assert [impact.evidence for impact in impacts] == [Evidence.RATE_JUMP] * hits
-
-
-JUMP, TURN = Evidence.VELOCITY_JUMP, Evidence.RATE_JUMP
-
-
-# The last: a force that comes later than the turn, and hardly a jump
-@pytest.mark.parametrize(
-    ("late_us", "jump", "push", "shown"),
-    [(2_000, -0.1, 0.0, [TURN]), (82_000, -0.1, 0.0, [JUMP]), (202_000, -0.1, 0.0, []), (82_000, 0.05, 0.8, [])],
-)
-def test_a_turn_and_a_velocity_jump_near_to_it_that_are_each_too_small_are_a_hit_together(late_us, jump, push, shown):
-    pushed = pulse((push, 0.0, 0.0), 2_994_500 + late_us, 4_000)
-    flight = Flight(pushed, imu_every_us=20_000, velocity=(1.0, 0.0, 0.0), rates=at_once(0.9))
-    flight.jump = (3_000_000 + late_us, (jump, 0.0, 0.0), 0)
-    found = [(impact.evidence, impact.is_shown_twice) for impact in flight.fly(3_300_000)]
-    assert found == [(evidence, True) for evidence in shown]
 
 
 def test_what_a_felt_contact_still_turns_is_no_other_hit():
