@@ -78,7 +78,7 @@ class Lever:
         # That may all have come while the accelerometer measured.
         unseen = share * changes * max(0.0, 1.0 - averaging_us / elapsed_us)
         self.error_m_s2 = self.height_error_m * math.hypot(a, b)
-        self.unseen_m_s2 = abs(self.below_m) * unseen + reflex.LEVER_M * (p * p + q * q + r * r)
+        self.unseen_m_s2 = (abs(self.below_m) + self.height_error_m) * unseen + reflex.LEVER_M * (p * p + q * q + r * r)
         share = min(1.0, elapsed_us / reflex.RATE_MEMORY_US)
         m, n = self._lasting_per_s2 = (m + share * (a - m), n + share * (b - n))
         self.turns_rad_s2 = math.hypot(m, n)
