@@ -24,11 +24,11 @@ class Slope:
     _against: float = 0.0
     _square: float = 0.0
 
-    def learn(self, y: Vector3, x: Vector3, instrument: Vector3 | None = None) -> None:
-        """Take one pair; where x is noisy, what x follows without that noise (an instrumental variable)."""
-        (a, b, c), (i, j, k) = y, instrument or x
+    def learn(self, y: Vector3, x: Vector3) -> None:
+        """Take one pair."""
+        (a, b, c), (i, j, k) = y, x
         self._against -= a * i + b * j + c * k
-        self._square += x[0] * i + x[1] * j + x[2] * k
+        self._square += i * i + j * j + k * k
 
     def found(self, variance: float) -> tuple[float, float]:
         """The slope and its standard deviation; `variance`: of y on an axis where x is zero."""

@@ -31,7 +31,7 @@ LEAST_SIDE_SHARE = 1.0 / 3.0
 # to 0.15 m (bench/notes/decisions.md).
 LEVER_M = 0.05
 # Of a turn with less, in the mean of RATE_MEMORY_US, the gyroscopes' noise of up to 0.1 rad/s hides too much.
-TURNS_RAD_S2 = 10.0
+TURNS_RAD_S2 = 8.0
 
 # --- a sample's force
 # A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On

@@ -186,7 +186,6 @@ def drawn_from_the_whole_schema(seed: int) -> dict[str, Any]:
     control["position_p_per_s"] = chance.uniform(0.1, 0.5) * p
     rotors = [rotor | {"spring": chance.random() < 0.5} for rotor in ring(count, radius_m)]
     drawn["imu"]["above_centre_m"] = chance.uniform(-0.02, 0.05)
-    drawn["imu"]["ahead_of_centre_m"] = chance.uniform(-0.02, 0.07)
     return drawn | {"rotors": rotors}
 
 
