@@ -113,7 +113,7 @@ class OnboardEstimator:
         self.filter = NavigationFilter(self._airframe, (px, py, pz), (vx, vy, vz), attitude_wxyz)
         self._samples = np.zeros((self._slots, strapdown.SAMPLE_COLUMNS))
         self._samples[:, strapdown.FORCE + 2] = -GRAVITY_M_S2
-        self._head, self._resets_told = 0, self.reset_counter
+        self._head = 0
         self._output = new_record(strapdown.Output, now=[*self.filter.nominal, 0.0, 0.0, 0.0])
         self._past = np.tile(self.filter.nominal[: strapdown.GYROSCOPE_BIAS], (self._slots, 1))
         self._waiting: deque[Sample] = deque()
@@ -135,6 +135,7 @@ class OnboardEstimator:
         ``faces``, the truth, go no further than the sensors.
         """
         self._sense(time_us, body, faces)
+        resets = self.reset_counter
         head = self._head = (self._head + 1) % self._slots
         strapdown.keep_sample(self._samples, head, sensed, self._clipped)
         oldest = (head + 1) % self._slots
@@ -145,8 +146,7 @@ class OnboardEstimator:
             self._fuse(self._waiting.popleft())
         nominal, past, output = self.filter.nominal, self._past, self._output
         strapdown.follow(nominal, self._samples, past, oldest, self._step_s, output)
-        if self._resets_told != self.reset_counter:
-            self._resets_told = self.reset_counter
+        if self.reset_counter != resets:
             strapdown.jump(nominal, past, oldest, output)
         strapdown.show(output.now, self._share, estimate, acceleration_ned_m_s2)
 

@@ -26,7 +26,7 @@ ERROR_ROWS = 17
 # Columns of an inertial sample: specific force, rates (means, FRD), raw samples clipped.
 FORCE, RATES, CLIPPED = 0, 3, 6
 SAMPLE_COLUMNS = 9
-# EKF2_TAU_VEL and EKF2_TAU_POS.
+# Time constant of the output predictor: EKF2_TAU_VEL and EKF2_TAU_POS, their defaults.
 TAU_S = 0.25
 
 # The camera never comes closer to the ground than its feet let it; below this the flow would only divide by zero.
@@ -168,7 +168,7 @@ def _fill_process(sample: Floats, noise: Floats, rotation: Floats, q: Floats) ->
 
 
 class Output:
-    """What the vehicle is told: the filter's state as of now, without its jumps."""
+    """What the vehicle goes by and reports: the filter's state as of now, without its jumps."""
 
     now: Annotated[Floats, (NOMINAL_ROWS + 3,)]  # as ``nominal``, and the last acceleration (NED)
     added: Annotated[Floats, (6,)]  # to position and velocity, since the start

@@ -54,7 +54,7 @@ def add_raw_sample(
 
 @inlined
 def beside_the_centre_m_s2(place: Floats, body: Floats, before: Floats, raw_s: float) -> tuple[float, float, float]:
-    """By how much more a place (FRD, m) of a body is accelerated than its centre; ``before``: its rates so long ago."""
+    """By how much more a place (FRD, m) of a body is accelerated than its centre; ``before``: rates ``raw_s`` ago."""
     x, y, z, p, q, r = place[0], place[1], place[2], body[10], body[11], body[12]
     a, b, c = (p - before[0]) / raw_s, (q - before[1]) / raw_s, (r - before[2]) / raw_s
     along, square = p * x + q * y + r * z, p * p + q * q + r * r

@@ -62,8 +62,8 @@ class Lever:
     _slope: Slope = field(default_factory=lambda: Slope(0.0, reflex.LEVER_M, -math.inf, math.inf))
 
     def at_centre(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> Vector3:
-        """Take force and rates (FRD) of a sample, the mean of `averaging_us`, so long after the one before it; the
-        force that there is at the point that the vehicle turns about."""
+        """Take force and rates (FRD) of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it; the
+        force at the point that the vehicle turns about."""
         (p, q, r), (a, b), (m, n), self._rates_rad_s = self._rates_rad_s, self.above_per_s2, self._mean_rad_s, w
         if not 0 < elapsed_us < LONGEST_GAP_US:
             self.above_per_s2, self._mean_rad_s = (0.0, 0.0), w[:2]

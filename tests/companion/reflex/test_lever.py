@@ -77,7 +77,7 @@ def test_a_turn_about_two_axes_at_once_is_taken_off_once_the_height_is_known() -
 
 def test_the_height_is_learnt_beside_the_gyroscopes_noise() -> None:
     lever, turning = Lever(), Turning((0.0, 0.0, -0.07), 40.0, noise_rad_s=0.005)
-    assert len(list(turning.fly(lever, 12.0))) > 0
+    list(turning.fly(lever, 12.0))
     assert lever.below_m == pytest.approx(-0.07, rel=0.1)
     assert lever.height_error_m < 0.01
 
