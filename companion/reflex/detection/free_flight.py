@@ -56,18 +56,15 @@ class Lever:
     above_per_s2: tuple[float, float] = (0.0, 0.0)  # of each metre of height, body x and y; none across a gap
     error_m_s2: float = 0.0  # standard deviation of the sideways force of a sample, by that of the height
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
-    turns_rad_s2: float = 0.0  # angular acceleration of roll and pitch in the mean of RATE_MEMORY_US
-    _mean_rad_s: tuple[float, float] = (0.0, 0.0)  # rates of roll and pitch, over that time
     _rates_rad_s: Vector3 = ZERO
     _slope: Slope = field(default_factory=lambda: Slope(0.0, reflex.LEVER_M, -math.inf, math.inf))
 
     def at_centre(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> Vector3:
         """Take force and rates (FRD) of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it; the
         force at the point that the vehicle turns about."""
-        (p, q, r), (a, b), (m, n), self._rates_rad_s = self._rates_rad_s, self.above_per_s2, self._mean_rad_s, w
+        (p, q, r), (a, b), self._rates_rad_s = self._rates_rad_s, self.above_per_s2, w
         if not 0 < elapsed_us < LONGEST_GAP_US:
-            self.above_per_s2, self._mean_rad_s = (0.0, 0.0), w[:2]
-            self.error_m_s2 = self.unseen_m_s2 = self.turns_rad_s2 = 0.0
+            self.above_per_s2, self.error_m_s2, self.unseen_m_s2 = (0.0, 0.0), 0.0, 0.0
             return f
         per_s = 1e6 / elapsed_us
         # Rates of before: a hit has not changed them. What no motor makes is none: of one forged rate it is little.
@@ -75,13 +72,10 @@ class Lever:
         changes = math.hypot(x, y)
         share = min(1.0, MOTORS_RAD_S2 / max(changes, 1.0))
         a, b = self.above_per_s2 = (a + share * x, b + share * y)
-        # That may all have come while the accelerometer measured.
-        unseen = share * changes * max(0.0, 1.0 - averaging_us / elapsed_us)
+        # That may all have come while the accelerometer measured. Rates differ by what was half an interval ago, too.
+        unseen = share * changes * max(0.5, 1.0 - averaging_us / elapsed_us)
         self.error_m_s2 = self.height_error_m * math.hypot(a, b)
         self.unseen_m_s2 = (abs(self.below_m) + self.height_error_m) * unseen + reflex.LEVER_M * (p * p + q * q + r * r)
-        self.turns_rad_s2 = 1e6 * math.hypot(w[0] - m, w[1] - n) / reflex.RATE_MEMORY_US
-        share = min(1.0, elapsed_us / reflex.RATE_MEMORY_US)
-        self._mean_rad_s = (m + share * (w[0] - m), n + share * (w[1] - n))
         return (f[0] + self.below_m * a, f[1] + self.below_m * b, f[2])
 
     def learn(self, off_frd_m_s2: Vector3, variance: float) -> None:

@@ -241,7 +241,7 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
-            if s.lever.turns_rad_s2 > reflex.TURNS_RAD_S2:
+            if s.turn.turns_rad_s2 > reflex.TURNS_RAD_S2:
                 s.lever.learn(minus(f, s.floor.mean_frd_m_s2), s.floor.side_m_s2**2)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:

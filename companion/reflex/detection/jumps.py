@@ -65,6 +65,12 @@ class RateJump(Innovation):
         learnt = size if size < limit else limit
         self.variance_rad2_s2 += was_us / (1e6 * reflex.MEMORY_S + was_us) * (learnt * learnt - self.variance_rad2_s2)
 
+    @property
+    def turns_rad_s2(self) -> float:
+        """Angular acceleration of roll and pitch, over about RATE_MEMORY_US."""
+        (p, q, _), (m, n, _) = self.newest_rad_s, self.mean_rad_s
+        return 1e6 * math.hypot(p - m, q - n) / (reflex.ACROSS_THRUST * reflex.RATE_MEMORY_US)
+
 
 @dataclass(slots=True)
 class VelocityJump:

@@ -280,7 +280,7 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     flight = Flight(rates=rolling(rad_s2)[1], heard=(Attitude, AttitudeTarget))
     assert flight.fly(3_500_000) == []
     flight.state.threshold_m_s2 = 1.75
-    for rate_rad_s in (0.0, 0.0, 0.24):
+    for rate_rad_s in (0.0, 0.0, 0.24, 0.48):
         flight.state.lever.at_centre(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
     most_m_s2 = 1.9 if is_known else math.hypot(1.75, 4.2 * 0.05 * 60.0)
     assert flight.state.side_threshold_m_s2(FusedConfig()) == pytest.approx(most_m_s2, rel=0.1)
