@@ -22,6 +22,7 @@ class VelocityFix:
     time_boot_us: int
     velocity_ned_m_s: Vector3
     sum_ned_m_s: Vector3
+    centre_ned_m_s: Vector3  # and that at the centre
 
     @property
     def less_sum_m_s(self) -> Vector3:
@@ -38,6 +39,7 @@ class Strapdown:
     rates_frd_rad_s: Vector3 = ZERO
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
+    sensor_frd_m: Vector3 = ZERO  # where the accelerometer is, from the centre, about which the vehicle turns
     valid_wxyz: Quaternion = LEVEL
     """At the newest sample: the last valid attitude, carried on by the rates.
 
@@ -92,6 +94,12 @@ class Strapdown:
             self.sum_ned_m_s = (n + half_s * (a_n + b_n), e + half_s * (a_e + b_e), d + half_s * (a_d + b_d))
         self.time_boot_us, self.rates_frd_rad_s, self.acceleration_ned_m_s2 = time_us, w, (a_n, a_e, a_d)
 
+    @property
+    def centre_ned_m_s(self) -> Vector3:
+        """The integral at the centre: that of the accelerometer less how fast it turns about the centre."""
+        (p, q, r), (x, y, z) = self.rates_frd_rad_s, self.sensor_frd_m
+        return minus(self.sum_ned_m_s, body_to_ned(self.valid_wxyz, (q * z - r * y, r * x - p * z, p * y - q * x)))
+
     def velocity(self, sample: LocalPosition | Odometry) -> None:
         time_us, told = sample.time_boot_us, self._odometry
         self.has_new_fix, ahead_us = False, time_us - self.time_boot_us
@@ -103,8 +111,9 @@ class Strapdown:
             return
         if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
             return
-        in_sum = plus(self.sum_ned_m_s, ahead_us * 1e-6, self.acceleration_ned_m_s2)
+        sums = (self.sum_ned_m_s, self.centre_ned_m_s)
+        in_sum, centre = (plus(each, ahead_us * 1e-6, self.acceleration_ned_m_s2) for each in sums)
         self.has_new_fix, fixes = True, self.fixes
-        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum))
+        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum, centre))
         while fixes[0].time_boot_us < time_us - KEPT_US:
             fixes.popleft()

@@ -10,7 +10,7 @@ from companion.messages import MessageId, Sample, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import Strapdown
 from companion.reflex.belief.motion_estimator import MotionEstimator
-from companion.reflex.detection.free_flight import ThrustGain
+from companion.reflex.detection.free_flight import Lever, ThrustGain
 
 
 class Phase(Enum):
@@ -68,6 +68,7 @@ class Motion:
 
     history: MotionHistory = field(init=False, default_factory=MotionHistory)
     strapdown: Strapdown = field(init=False, default_factory=Strapdown)
+    lever: Lever = field(init=False, default_factory=Lever)
     followed: list[MotionEstimator] = field(init=False, default_factory=list)
     """After the collision that is recovered from and the one before, and after the newest, if nobody answers that."""
     hides_clipping: bool = field(init=False, default=False)

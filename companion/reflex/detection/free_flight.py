@@ -4,11 +4,15 @@ force of full thrust."""
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
 from companion.messages import Vector3
 from companion.motion.config import CURRENT_US, LONGEST_GAP_US, MOTORS_RAD_S2
-from companion.motion.slope import Slope
 from companion.motion.vector import ZERO
 from companion.reflex import config as reflex
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(slots=True)
@@ -45,48 +49,74 @@ class ForceNoise:
 
 @dataclass(slots=True)
 class Lever:
-    """Where the accelerometer is, from the point that the vehicle turns about. Changed only by its methods.
+    """Where the accelerometer is, from the point that the vehicle turns about. Changed only by its methods; body FRD.
 
-    With the rates p, q, r it is accelerated by h (-q' - p r, p' - q r) at a height h above that point, and by up to
-    d (p^2 + q^2 + r^2) at a distance d beside it. The height is learnt, the distance is not.
+    With the rates w it shows w' x r + w x (w x r) more at a place r beside that point. Of f_x and f_y, in which thrust
+    has no part, that is H r. r is the least-squares estimate over the turns of the flight, with a prior about zero.
     """
 
-    below_m: float = 0.0
-    height_error_m: float = reflex.LEVER_M  # standard deviation
-    above_per_s2: tuple[float, float] = (0.0, 0.0)  # of each metre of height, body x and y; none across a gap
-    error_m_s2: float = 0.0  # standard deviation of the sideways force of a sample, by that of the height
+    place_frd_m: Vector3 = ZERO
+    errors_m: Vector3 = (reflex.LEVER_M, reflex.LEVER_M, reflex.LEVER_M)  # standard deviations
+    force_frd_m_s2: Vector3 = ZERO  # of the newest sample, at that point
+    error_m_s2: float = 0.0  # standard deviation of its sideways part, by that of the height
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
-    _rates_rad_s: Vector3 = ZERO
-    _slope: Slope = field(default_factory=lambda: Slope(0.0, reflex.LEVER_M, -math.inf, math.inf))
+    spins_per_s2: float = 0.0  # square of the rates
+    _rates_rad_s: tuple[Vector3, Vector3] = (ZERO, ZERO)  # of the sample before, and the newest
+    _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
+    _mean: Floats = field(default_factory=lambda: np.zeros((2, 3)))  # of H, as that of the force
+    _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    _against: Floats = field(default_factory=lambda: np.zeros(3))
 
-    def at_centre(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> Vector3:
-        """Take force and rates (FRD) of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it; the
-        force at the point that the vehicle turns about."""
-        (p, q, r), (a, b), self._rates_rad_s = self._rates_rad_s, self.above_per_s2, w
+    def imu(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> None:
+        """Take force and rates of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it."""
+        # Rates of before: a hit has not changed them.
+        (p, q, r), (i, j, _) = self._rates_rad_s[1], self._turns_rad_s2
+        self._rates_rad_s, self.force_frd_m_s2 = ((p, q, r), w), f
         if not 0 < elapsed_us < LONGEST_GAP_US:
-            self.above_per_s2, self.error_m_s2, self.unseen_m_s2 = (0.0, 0.0), 0.0, 0.0
-            return f
+            self._turns_rad_s2, self.error_m_s2, self.unseen_m_s2, self.spins_per_s2 = ZERO, 0.0, 0.0, 0.0
+            return
         per_s = 1e6 / elapsed_us
-        # Rates of before: a hit has not changed them. What no motor makes is none: of one forged rate it is little.
-        x, y = (q - w[1]) * per_s - p * r - a, (w[0] - p) * per_s - q * r - b
+        # What no motor makes is none: of one forged rate it is little.
+        x, y = (w[0] - p) * per_s - i, (w[1] - q) * per_s - j
         changes = math.hypot(x, y)
         share = min(1.0, MOTORS_RAD_S2 / max(changes, 1.0))
-        a, b = self.above_per_s2 = (a + share * x, b + share * y)
+        k = min(max((w[2] - r) * per_s, -MOTORS_RAD_S2), MOTORS_RAD_S2)
+        self._turns_rad_s2 = i, j, k = i + share * x, j + share * y, k
+        square = self.spins_per_s2 = p * p + q * q + r * r
         # That may all have come while the accelerometer measured. Rates differ by what was half an interval ago, too.
-        unseen = share * changes * max(0.5, 1.0 - averaging_us / elapsed_us)
-        self.error_m_s2 = self.height_error_m * math.hypot(a, b)
-        self.unseen_m_s2 = (abs(self.below_m) + self.height_error_m) * unseen + reflex.LEVER_M * (p * p + q * q + r * r)
-        return (f[0] + self.below_m * a, f[1] + self.below_m * b, f[2])
+        unseen = min(changes, MOTORS_RAD_S2) * max(0.5, 1.0 - averaging_us / elapsed_us)
+        (x, y, z), (x_error, y_error, z_error) = self.place_frd_m, self.errors_m
+        self.error_m_s2 = z_error * math.hypot(p * r + j, q * r - i)
+        self.unseen_m_s2 = (abs(z) + z_error) * unseen + max(x_error, y_error) * square
+        n = p * x + q * y + r * z
+        self.force_frd_m_s2 = (
+            f[0] - j * z + k * y - p * n + square * x,
+            f[1] - k * x + i * z - q * n + square * y,
+            f[2] - i * y + j * x - r * n + square * z,
+        )
 
-    def learn(self, off_frd_m_s2: Vector3, variance: float) -> None:
-        """Take by how much the newest sample of a free vehicle that turns, as of that point, is off the mean.
+    def learn(self, off_frd_m_s2: Vector3, variance: float, elapsed_s: float, turns: bool) -> None:
+        """Take by how much the force of a free vehicle, as of that point, is off its mean of MEAN_MEMORY_S.
 
-        `variance`: of that.
+        `variance`: of that without a turn; `turns`: it is one beyond the gyroscopes' noise.
         """
-        a, b = self.above_per_s2
-        as_shown = (off_frd_m_s2[0] - self.below_m * a, off_frd_m_s2[1] - self.below_m * b, 0.0)
-        self._slope.learn(as_shown, (a, b, 0.0))
-        self.below_m, self.height_error_m = self._slope.found(variance)
+        if not turns and not self._mean.any():
+            return
+        (p, q, r), (i, j, k) = self._rates_rad_s[0], self._turns_rad_s2
+        h = np.array([[-q * q - r * r, p * q - k, p * r + j], [p * q + k, -p * p - r * r, q * r - i]])
+        # The noise lasts as long as the mean.
+        share = min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0)
+        self._mean += share * (h - self._mean)
+        if not turns and np.abs(self._mean).max() < 1.0:
+            self._mean = np.zeros((2, 3))
+        h -= self._mean
+        self._square += share * h.T @ h
+        self._against += share * h.T @ (off_frd_m_s2[:2] + h @ self.place_frd_m)
+        known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
+        x, y, z = (known @ self._against).tolist()
+        self.place_frd_m = (x, y, z)
+        x, y, z = np.sqrt(variance * known.diagonal()).tolist()
+        self.errors_m = (x, y, z)
 
 
 @dataclass(slots=True)

@@ -147,9 +147,8 @@ class FusedDetector:
     def step(self, state: FusedState, sample: Sample, situation: Situation, motion: Motion) -> Impact | None:
         if type(sample) is ImuSample:
             before_us, now_us = state.last_sample_boot_us, sample.time_boot_us
-            f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-            state.turn.imu(before_us, now_us, w, self._config)
-            force_frd_m_s2 = state.lever.at_centre(now_us - before_us, f, w, self._averaging_us)
+            state.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, self._config)
+            state.lever, force_frd_m_s2 = motion.lever, motion.lever.force_frd_m_s2
             impact = self._imu(state, sample, force_frd_m_s2, situation, motion)
             state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, force_frd_m_s2
             return impact
@@ -241,8 +240,9 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
-            if s.turn.turns_rad_s2 > reflex.TURNS_RAD_S2:
-                s.lever.learn(minus(f, s.floor.mean_frd_m_s2), s.floor.side_m_s2**2)
+            spread_m_s2 = s.threshold_m_s2 / config.noise_factor
+            is_turning = max(s.turn.turns_rad_s2, s.lever.spins_per_s2) > reflex.TURNS_RAD_S2
+            s.lever.learn(minus(f, s.floor.mean_frd_m_s2), spread_m_s2**2, elapsed_s, is_turning)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2
