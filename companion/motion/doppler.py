@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from companion.messages import GpsFix, LocalPosition, Vector3
 from companion.motion import config as numbers
 from companion.motion.slope import Slope
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import Strapdown, VelocityFix
 from companion.motion.vector import ZERO, flat, limited, minus, plus, towards
 
 
@@ -76,7 +76,7 @@ class Doppler:
         faster = _faster_by(strapdown, usual_s)
         if faster is None:
             return
-        (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, strapdown.centre_ned_m_s)
+        (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, _at_centre(strapdown))
         behind: Vector3 = (n - own[0], e - own[1], 0.0)
         change = plus(ZERO, 1.0 / usual_s, faster)
         most_m_s = numbers.GATE * math.sqrt(self.variance_m2_s2)
@@ -137,12 +137,17 @@ class MeasuredVelocity:
 
 def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:
     """What the accelerometer has added to the horizontal velocity in so long; None where that is not kept."""
-    now_us, sum_m_s = strapdown.time_boot_us, strapdown.centre_ned_m_s
+    now_us, sum_m_s = strapdown.time_boot_us, _at_centre(strapdown)
     at_us, later_us, later_m_s = now_us - round(1e6 * since_s), now_us, sum_m_s
     for fix in reversed(strapdown.fixes):
         if fix.time_boot_us <= at_us:
             share = (at_us - fix.time_boot_us) / max(later_us - fix.time_boot_us, 1)
-            then_m_s = towards(fix.centre_ned_m_s, later_m_s, share)
+            then_m_s = towards(_at_centre(fix), later_m_s, share)
             return flat(minus(sum_m_s, then_m_s))
-        later_us, later_m_s = fix.time_boot_us, fix.centre_ned_m_s
+        later_us, later_m_s = fix.time_boot_us, _at_centre(fix)
     return None
+
+
+def _at_centre(of: Strapdown | VelocityFix) -> Vector3:
+    """The accelerometer's integral as it were at the vehicle's centre, of which a receiver measures the velocity."""
+    return minus(of.sum_ned_m_s, of.turns_ned_m_s)

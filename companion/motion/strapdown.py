@@ -22,7 +22,7 @@ class VelocityFix:
     time_boot_us: int
     velocity_ned_m_s: Vector3
     sum_ned_m_s: Vector3
-    centre_ned_m_s: Vector3  # and that at the centre
+    turns_ned_m_s: Vector3 = ZERO  # how fast the accelerometer turns about the vehicle's centre
 
     @property
     def less_sum_m_s(self) -> Vector3:
@@ -40,6 +40,7 @@ class Strapdown:
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
     sensor_frd_m: Vector3 = ZERO  # where the accelerometer is, from the centre, about which the vehicle turns
+    centre_frd_m_s2: Vector3 = ZERO  # specific force there
     valid_wxyz: Quaternion = LEVEL
     """At the newest sample: the last valid attitude, carried on by the rates.
 
@@ -76,8 +77,8 @@ class Strapdown:
             told, valid = (body_to_ned(each, (0.0, 0.0, 1.0))[2] for each in (attitude_wxyz, self.valid_wxyz))
             self.sinks_m_s2 = GRAVITY_M_S2 * (told - valid)
 
-    def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
-        """Integrate one sample (body FRD); a gap restarts the integral."""
+    def imu(self, time_us: int, f: Vector3, w: Vector3, at_centre: Vector3 | None = None) -> None:
+        """Integrate one sample (body FRD), whose force may be another at the centre; a gap restarts the integral."""
         elapsed_us = time_us - self.time_boot_us
         whole, half_s = 0 < elapsed_us < LONGEST_GAP_US, 0.5e-6 * elapsed_us
         if whole:
@@ -93,12 +94,13 @@ class Strapdown:
             n, e, d = self.sum_ned_m_s
             self.sum_ned_m_s = (n + half_s * (a_n + b_n), e + half_s * (a_e + b_e), d + half_s * (a_d + b_d))
         self.time_boot_us, self.rates_frd_rad_s, self.acceleration_ned_m_s2 = time_us, w, (a_n, a_e, a_d)
+        self.centre_frd_m_s2 = at_centre or f
 
     @property
-    def centre_ned_m_s(self) -> Vector3:
-        """The integral at the centre: that of the accelerometer less how fast it turns about the centre."""
+    def turns_ned_m_s(self) -> Vector3:
+        """How fast the accelerometer turns about the vehicle's centre."""
         (p, q, r), (x, y, z) = self.rates_frd_rad_s, self.sensor_frd_m
-        return minus(self.sum_ned_m_s, body_to_ned(self.valid_wxyz, (q * z - r * y, r * x - p * z, p * y - q * x)))
+        return body_to_ned(self.valid_wxyz, (q * z - r * y, r * x - p * z, p * y - q * x))
 
     def velocity(self, sample: LocalPosition | Odometry) -> None:
         time_us, told = sample.time_boot_us, self._odometry
@@ -111,9 +113,8 @@ class Strapdown:
             return
         if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
             return
-        sums = (self.sum_ned_m_s, self.centre_ned_m_s)
-        in_sum, centre = (plus(each, ahead_us * 1e-6, self.acceleration_ned_m_s2) for each in sums)
+        in_sum = plus(self.sum_ned_m_s, ahead_us * 1e-6, self.acceleration_ned_m_s2)
         self.has_new_fix, fixes = True, self.fixes
-        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum, centre))
+        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum, self.turns_ned_m_s))
         while fixes[0].time_boot_us < time_us - KEPT_US:
             fixes.popleft()

@@ -27,11 +27,12 @@ EXCESS = 1.5
 LEAST_SIDE_SHARE = 1.0 / 3.0
 
 # --- the accelerometer's place
-# Standard deviation of its height about the point that the vehicle turns about: in public logs it is above it, by 0.02
-# to 0.15 m (bench/notes/decisions.md).
+# Standard deviation of each of its coordinates from the point that the vehicle turns about: in public logs it is 0.02
+# to 0.15 m above it, EKF2_IMU_POS_X of PX4's own airframes is 0.02 and 0.06 (bench/notes/decisions.md).
 LEVER_M = 0.05
-# Of a turn with less, in the mean of RATE_MEMORY_US, the gyroscopes' noise of up to 0.1 rad/s hides too much.
-TURNS_RAD_S2 = 8.0
+# A turn with less shows too little of it, as an angular acceleration in the mean of RATE_MEMORY_US, or as the square of
+# the rates: gyroscopes' noise of up to 0.1 rad/s hides it.
+TURNS_PER_S2 = 8.0
 
 # --- a sample's force
 # A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On

@@ -116,9 +116,8 @@ class MotionEstimator:
         if not self.is_fully_measured and (is_pushed or was_measured):
             self._begin(impulse_m_s)
 
-    def imu(self, strapdown: Strapdown, force_frd_m_s2: Vector3) -> None:
-        """Integrate the newest sample, its force as at the centre. More than 1 g is the contact itself, whose effect
-        `start` already contains."""
+    def imu(self, strapdown: Strapdown) -> None:
+        """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
         self._time_boot_us = time_us
         if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
@@ -126,7 +125,7 @@ class MotionEstimator:
             self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
         if not 0.0 < elapsed_s < 1e-6 * numbers.LONGEST_GAP_US:
             return
-        force = body_to_ned(strapdown.valid_wxyz, force_frd_m_s2)
+        force = body_to_ned(strapdown.valid_wxyz, strapdown.centre_frd_m_s2)
         pushed = plus(force, GRAVITY_M_S2, (0.0, 0.0, 1.0))
         pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
         was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)

@@ -61,6 +61,7 @@ class Lever:
     error_m_s2: float = 0.0  # standard deviation of its sideways part, by that of the height
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     spins_per_s2: float = 0.0  # square of the rates
+    has_turned: bool = False  # so lately that the mean of the force still shows it
     _rates_rad_s: tuple[Vector3, Vector3] = (ZERO, ZERO)  # of the sample before, and the newest
     _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
     _mean: Floats = field(default_factory=lambda: np.zeros((2, 3)))  # of H, as that of the force
@@ -100,16 +101,15 @@ class Lever:
 
         `variance`: of that without a turn; `turns`: it is one beyond the gyroscopes' noise.
         """
-        if not turns and not self._mean.any():
-            return
         (p, q, r), (i, j, k) = self._rates_rad_s[0], self._turns_rad_s2
         h = np.array([[-q * q - r * r, p * q - k, p * r + j], [p * q + k, -p * p - r * r, q * r - i]])
-        # The noise lasts as long as the mean.
-        share = min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0)
-        self._mean += share * (h - self._mean)
-        if not turns and np.abs(self._mean).max() < 1.0:
-            self._mean = np.zeros((2, 3))
+        self._mean += min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0) * (h - self._mean)
         h -= self._mean
+        self.has_turned = turns or bool(np.abs(self._mean).max() > reflex.TURNS_PER_S2)
+        if not self.has_turned:
+            self._mean = np.zeros((2, 3))
+        # All samples within RATE_MEMORY_US count as one: what else pushes lasts.
+        share = min(1e6 * elapsed_s / reflex.RATE_MEMORY_US, 1.0)
         self._square += share * h.T @ h
         self._against += share * h.T @ (off_frd_m_s2[:2] + h @ self.place_frd_m)
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))

@@ -56,7 +56,6 @@ class FusedState(DetectorState):
     """Of the newest IMU sample and velocity. A velocity that cannot be compared has an infinite limit."""
     vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
-    lever: Lever = field(default_factory=Lever)
     jump: VelocityJump = field(default_factory=VelocityJump)
     velocity_ned_m_s: Vector3 | None = None
     moved_boot_us: int = 0
@@ -72,19 +71,20 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
-    def side_threshold_m_s2(self, config: reflex.FusedConfig) -> float:
+    def side_threshold_m_s2(self, config: reflex.FusedConfig, lever: Lever) -> float:
         """Horizontal threshold, m/s^2. In a turn what is not known of the accelerometer's place adds to the noise."""
-        turned_m_s2 = config.noise_factor * self.lever.error_m_s2
-        return math.hypot(self.threshold_m_s2, turned_m_s2) + self.lever.unseen_m_s2
+        turned_m_s2 = config.noise_factor * lever.error_m_s2
+        return math.hypot(self.threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
 
-    def side_force(self, config: reflex.FusedConfig, f: Vector3) -> tuple[float, float, bool]:
+    def side_force(self, config: reflex.FusedConfig, lever: Lever) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
 
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        force, mean = f[:2], self.floor.mean_frd_m_s2[:2]
-        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config)
+        f, mean = lever.force_frd_m_s2, self.floor.mean_frd_m_s2[:2]
+        force = f[:2]
+        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config, lever)
         if self.phase is not Phase.ARMED:
             return alone, limit, False
         if math.hypot(*mean) > config.side_threshold_m_s2:
@@ -148,9 +148,8 @@ class FusedDetector:
         if type(sample) is ImuSample:
             before_us, now_us = state.last_sample_boot_us, sample.time_boot_us
             state.turn.imu(before_us, now_us, sample.angular_velocity_frd_rad_s, self._config)
-            state.lever, force_frd_m_s2 = motion.lever, motion.lever.force_frd_m_s2
-            impact = self._imu(state, sample, force_frd_m_s2, situation, motion)
-            state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, force_frd_m_s2
+            impact = self._imu(state, sample, situation, motion)
+            state.before_frd_m_s2, state.last_frd_m_s2 = state.last_frd_m_s2, motion.lever.force_frd_m_s2
             return impact
         if isinstance(sample, (LocalPosition, Odometry)):
             return self._velocity(state, sample, situation, motion)
@@ -160,14 +159,14 @@ class FusedDetector:
 
     # --- force ------------------------------------------------------------------------------------------------
 
-    def _imu(self, s: FusedState, sample: ImuSample, f: Vector3, situation: Situation, motion: Motion) -> Impact | None:
-        config, now_us = self._config, sample.time_boot_us
+    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation, motion: Motion) -> Impact | None:
+        config, now_us, f = self._config, sample.time_boot_us, motion.lever.force_frd_m_s2
         off = situation.off_reason
         if off is None and situation.is_on_ground:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
-        s.side.value, s.side.limit, is_of_two = s.side_force(config, f)
+        s.side.value, s.side.limit, is_of_two = s.side_force(config, motion.lever)
         if is_of_two:
             free_until_us = earlier_us
         s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
@@ -180,7 +179,7 @@ class FusedDetector:
             s.last_loud_boot_us = now_us + (reflex.SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if ratio < 1.0:
             s.observed = None
-            self._learn(s, f, before_us)
+            self._learn(s, motion.lever, before_us)
             is_quiet = s.floor.known_s >= reflex.LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
@@ -190,7 +189,7 @@ class FusedDetector:
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
         is_learnt = math.dist(f, s.floor.mean_frd_m_s2) < s.threshold_m_s2
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:
-            self._learn(s, f, before_us)  # a shaking that stays
+            self._learn(s, motion.lever, before_us)  # a shaking that stays
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         # Noise hardly brings the sample before so near to its limit, too.
         is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
@@ -229,8 +228,8 @@ class FusedDetector:
         impact = classified(impact, s.velocity_ned_m_s, situation, motion)
         return self._begun(s, impact) if impact.kind is ImpactKind.CRASH else None
 
-    def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
-        elapsed_us = s.last_sample_boot_us - before_us
+    def _learn(self, s: FusedState, lever: Lever, before_us: int) -> None:
+        elapsed_us, f = s.last_sample_boot_us - before_us, lever.force_frd_m_s2
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         lifts_m_s2 = -s.thrust.expected_m_s2(s.last_sample_boot_us, s.floor.mean_frd_m_s2[2])
@@ -240,9 +239,10 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
-            spread_m_s2 = s.threshold_m_s2 / config.noise_factor
-            is_turning = max(s.turn.turns_rad_s2, s.lever.spins_per_s2) > reflex.TURNS_RAD_S2
-            s.lever.learn(minus(f, s.floor.mean_frd_m_s2), spread_m_s2**2, elapsed_s, is_turning)
+            is_turning = s.turn.turns_rad_s2 > reflex.TURNS_PER_S2 or lever.spins_per_s2 > reflex.TURNS_PER_S2
+            if is_turning or lever.has_turned:
+                spread_m_s2 = s.threshold_m_s2 / config.noise_factor
+                lever.learn(minus(f, s.floor.mean_frd_m_s2), spread_m_s2**2, elapsed_s, is_turning)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2

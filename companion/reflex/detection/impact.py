@@ -100,10 +100,13 @@ class ImpactEstimator(Motion):
             elapsed_us = sample.time_boot_us - self.strapdown.time_boot_us
             self.lever.imu(elapsed_us, f, w, round(1e6 * self.config.imu_averaging_interval_s))
             self.strapdown.imu(sample.time_boot_us, f, w)
-            self.strapdown.sensor_frd_m = self.lever.place_frd_m
+            self.strapdown.sensor_frd_m, self.strapdown.centre_frd_m_s2 = (
+                self.lever.place_frd_m,
+                self.lever.force_frd_m_s2,
+            )
             self.earlier_imu, self.imu = self.imu, sample
             for after in self.followed:
-                after.imu(self.strapdown, self.lever.force_frd_m_s2)
+                after.imu(self.strapdown)
             if self.followed and self.followed[0].has_faded:
                 del self.followed[0]
         elif isinstance(sample, (LocalPosition, Odometry)):

@@ -34,6 +34,7 @@ class RateJump(Innovation):
     over_us: int = 0
     mean_rad_s: Vector3 = ZERO
     variance_rad2_s2: float = 0.0
+    turns_rad_s2: float = 0.0  # angular acceleration of roll and pitch, over about RATE_MEMORY_US
 
     def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3, config: reflex.FusedConfig) -> None:
         """Take one sample; the one before it was at `before_us`."""
@@ -59,17 +60,13 @@ class RateJump(Innovation):
             self.mean_rad_s, least = (x, y, z), least * share
         else:
             self.mean_rad_s = (m + share * i, n + share * j, o + share * k)
+        m, n, _ = self.mean_rad_s
+        self.turns_rad_s2 = 1e6 * math.hypot(p - m, q - n) / (reflex.ACROSS_THRUST * reflex.RATE_MEMORY_US)
         spreads_rad_s = reflex.EXCESS * config.noise_factor * math.sqrt(self.variance_rad2_s2)
         size = self.value = math.hypot(i, j, k)
         limit = self.limit = least if least > spreads_rad_s else spreads_rad_s
         learnt = size if size < limit else limit
         self.variance_rad2_s2 += was_us / (1e6 * reflex.MEMORY_S + was_us) * (learnt * learnt - self.variance_rad2_s2)
-
-    @property
-    def turns_rad_s2(self) -> float:
-        """Angular acceleration of roll and pitch, over about RATE_MEMORY_US."""
-        (p, q, _), (m, n, _) = self.newest_rad_s, self.mean_rad_s
-        return 1e6 * math.hypot(p - m, q - n) / (reflex.ACROSS_THRUST * reflex.RATE_MEMORY_US)
 
 
 @dataclass(slots=True)

@@ -83,7 +83,8 @@ class Flight:
 
     def fly(self, until_us=4_000_000, **config):
         detector = FusedDetector(FusedConfig(**config), WINDOW_US)
-        self.state, impacts, motion = detector.initial(), [], ImpactEstimator(EstimateConfig())
+        self.state, impacts = detector.initial(), []
+        motion = self.motion = ImpactEstimator(EstimateConfig())
         motion.hides_clipping = self.is_filtered
         for t, sample in self.samples(until_us):
             if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
@@ -270,10 +271,10 @@ def test_what_a_sensor_beside_the_centre_shows_of_a_turn_is_no_hit_and_a_push_th
     flight = Flight(push, rates=rates, heard=(Attitude, AttitudeTarget))
     # When it flies on, then the push alone is a hit, in its first whole sample; where the sensor is has been learnt
     assert [i.sample_time_boot_us for i in flight.fly(3_500_000)] == [pytest.approx(HIT_US + 4_000, abs=4_000)]
-    assert flight.state.lever.below_m == pytest.approx(-above_m, abs=0.01)
+    assert flight.motion.lever.place_frd_m[2] == pytest.approx(-above_m, abs=0.01)
 
 
-@pytest.mark.parametrize(("rad_s2", "is_known"), [(8.0, False), (15.0, True)])
+@pytest.mark.parametrize(("rad_s2", "is_known"), [(8.0, False), (20.0, True)])
 def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has_shown_where_the_sensor_is(
     rad_s2, is_known
 ):
@@ -281,9 +282,9 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     assert flight.fly(3_500_000) == []
     flight.state.threshold_m_s2 = 1.75
     for rate_rad_s in (0.0, 0.0, 0.24, 0.48):
-        flight.state.lever.at_centre(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
+        flight.motion.lever.imu(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
     most_m_s2 = 1.9 if is_known else math.hypot(1.75, 4.2 * 0.05 * 60.0)
-    assert flight.state.side_threshold_m_s2(FusedConfig()) == pytest.approx(most_m_s2, rel=0.1)
+    assert flight.state.side_threshold_m_s2(FusedConfig(), flight.motion.lever) == pytest.approx(most_m_s2, rel=0.1)
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():

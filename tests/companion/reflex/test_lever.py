@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from companion.reflex.config import TURNS_RAD_S2, FusedConfig
+from companion.reflex.config import MEAN_MEMORY_S, TURNS_PER_S2, FusedConfig
 from companion.reflex.detection.free_flight import Lever
 from companion.reflex.detection.jumps import RateJump
 
@@ -19,7 +19,7 @@ class Turning:
 
     def __init__(self, place_m, burst_rad_s2, every_us=WINDOW_US, yaw_rad_s=0.0, noise_rad_s=0.0, period_s=0.25):
         self.place_m, self.burst_rad_s2, self.every_us = np.array(place_m), burst_rad_s2, every_us
-        self.period_s = period_s
+        self.period_s, self.mean = period_s, np.zeros(3)
         self.rates = np.array([0.0, 0.0, yaw_rad_s])
         self.noise_rad_s, self.rng = noise_rad_s, random.Random(2)
 
@@ -45,11 +45,14 @@ class Turning:
         config, turn = FusedConfig(), RateJump()
         for number, (f, w) in enumerate(self.samples(until_s)):
             turn.imu(number * self.every_us, (number + 1) * self.every_us, w, config)
-            x, y, _ = lever.at_centre(self.every_us, f, w, WINDOW_US)
+            lever.imu(self.every_us, f, w, WINDOW_US)
+            x, y, _ = lever.force_frd_m_s2
             turned_m_s2 = config.noise_factor * lever.error_m_s2
             yield math.hypot(x, y), math.hypot(config.side_threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
-            if turn.turns_rad_s2 > TURNS_RAD_S2:
-                lever.learn((x, y, 0.0), 0.25)
+            turns = turn.turns_rad_s2 > TURNS_PER_S2 or lever.spins_per_s2 > TURNS_PER_S2
+            if turns or lever.has_turned:
+                self.mean += min(1e-6 * self.every_us / MEAN_MEMORY_S, 1.0) * (np.array([x, y, 0.0]) - self.mean)
+                lever.learn(tuple(np.array([x, y, 0.0]) - self.mean), 0.25, 1e-6 * self.every_us, turns)
 
 
 @pytest.mark.parametrize(
@@ -66,12 +69,12 @@ def test_what_a_turn_shows_beside_the_centre_is_no_hit(place_m, burst_rad_s2, ev
     lever = Lever()
     shown = list(Turning(place_m, burst_rad_s2, every_us, yaw_rad_s).fly(lever, 6.0))
     assert max(size / limit for size, limit in shown[1:]) < 0.9
-    assert lever.below_m == pytest.approx(place_m[2], abs=0.015)
+    assert lever.place_frd_m[2] == pytest.approx(place_m[2], abs=0.015)
 
 
 def test_a_turn_that_begins_sooner_than_the_rates_show_is_no_hit_either() -> None:
     # Two rates differ by what was half an interval ago.
-    lever, turning = Lever(below_m=-0.08, height_error_m=0.002), Turning((0.0, 0.0, -0.08), 160.0, period_s=0.08)
+    lever, turning = Lever((0.0, 0.0, -0.08), (0.05, 0.05, 0.002)), Turning((0.0, 0.0, -0.08), 160.0, period_s=0.08)
     assert max(size / limit for size, limit in list(turning.fly(lever, 6.0))[1:]) < 0.9
 
 
@@ -79,28 +82,33 @@ def test_a_turn_about_two_axes_at_once_is_taken_off_once_the_height_is_known() -
     rates = np.array([3.0, -2.0, 4.0])
     force = tuple(np.cross(rates, np.cross(rates, (0.0, 0.0, -0.1))).tolist())
     assert math.hypot(*force[:2]) > 1.4
-    lever = Lever(below_m=-0.1)
-    x, y, _ = [lever.at_centre(WINDOW_US, force, tuple(rates.tolist()), WINDOW_US) for _ in range(60)][-1]
-    assert math.hypot(x, y) < 1e-6
+    lever = Lever((0.0, 0.0, -0.1))
+    for _ in range(60):
+        lever.imu(WINDOW_US, force, tuple(rates.tolist()), WINDOW_US)
+    assert math.hypot(*lever.force_frd_m_s2) < 1e-6
 
 
 def test_the_height_is_learnt_beside_the_gyroscopes_noise() -> None:
     lever, turning = Lever(), Turning((0.0, 0.0, -0.07), 40.0, noise_rad_s=0.005)
     list(turning.fly(lever, 12.0))
-    assert lever.below_m == pytest.approx(-0.07, rel=0.1)
-    assert lever.height_error_m < 0.01
+    assert lever.place_frd_m[2] == pytest.approx(-0.07, rel=0.1)
+    assert lever.errors_m[2] < 0.01
 
 
 def test_one_forged_rate_makes_little_of_a_force_and_none_after_it() -> None:
-    lever = Lever(below_m=-0.05)
+    lever = Lever((0.0, 0.0, -0.05))
     rates = [(0.0, 0.0, 0.0)] * 5 + [(30.0, 0.0, 0.0)] + [(0.0, 0.0, 0.0)] * 5
-    shown = [math.hypot(*lever.at_centre(WINDOW_US, (0.0, 0.0, -9.8), rate, WINDOW_US)[:2]) for rate in rates]
+    shown = []
+    for rate in rates:
+        lever.imu(WINDOW_US, (0.0, 0.0, -9.8), rate, WINDOW_US)
+        shown.append(math.hypot(*lever.force_frd_m_s2[:2]))
     assert shown[5] == pytest.approx(0.05 * 100.0)
     assert max(shown[:5] + shown[6:]) < 0.1
 
 
 def test_across_a_gap_nothing_is_known_of_a_turn() -> None:
-    lever = Lever(below_m=-0.05)
-    lever.at_centre(WINDOW_US, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0), WINDOW_US)
-    assert lever.at_centre(200_000, (1.0, 0.0, -9.8), (3.0, 2.0, 1.0), WINDOW_US) == (1.0, 0.0, -9.8)
+    lever = Lever((0.0, 0.0, -0.05))
+    lever.imu(WINDOW_US, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0), WINDOW_US)
+    lever.imu(200_000, (1.0, 0.0, -9.8), (3.0, 2.0, 1.0), WINDOW_US)
+    assert lever.force_frd_m_s2 == (1.0, 0.0, -9.8)
     assert (lever.error_m_s2, lever.unseen_m_s2) == (0.0, 0.0)

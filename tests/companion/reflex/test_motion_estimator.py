@@ -8,10 +8,10 @@ import pytest
 
 from companion.flight.context import Inputs
 from companion.messages import Attitude, LocalPosition
-from companion.motion.config import CURRENT_US, SAME_M_S, TILT_RAD_PER_M_S
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, SAME_M_S, TILT_RAD_PER_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
-from companion.motion.vector import ZERO
+from companion.motion.vector import ZERO, minus
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, UNCORRECTED_US, EstimateConfig
 from companion.reflex.surface import Contact, MotionState
@@ -139,7 +139,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     def go_on(seconds, acceleration):
         for _ in range(round(seconds / 0.004)):
             strapdown.time_boot_us = (strapdown.time_boot_us or HIT_US) + 4_000
-            strapdown.acceleration_ned_m_s2 = acceleration
+            strapdown.centre_frd_m_s2 = minus(acceleration, (0.0, 0.0, GRAVITY_M_S2))
             found.imu(strapdown)
 
     go_on(0.02, (-9.0, 0.0, 0.0))
