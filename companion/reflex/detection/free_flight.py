@@ -64,7 +64,8 @@ class Lever:
     has_turned: bool = False  # so lately that the mean of the force still shows it
     _rates_rad_s: tuple[Vector3, Vector3] = (ZERO, ZERO)  # of the sample before, and the newest
     _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
-    _mean: Floats = field(default_factory=lambda: np.zeros((2, 3)))  # of H, as that of the force
+    _shown_m_s2: Vector3 = ZERO  # by the newest sample
+    _mean: Floats = field(default_factory=lambda: np.zeros((2, 4)))  # of H, and of what is shown of f_x and f_y
     _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     _against: Floats = field(default_factory=lambda: np.zeros(3))
 
@@ -72,7 +73,7 @@ class Lever:
         """Take force and rates of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it."""
         # Rates of before: a hit has not changed them.
         (p, q, r), (i, j, _) = self._rates_rad_s[1], self._turns_rad_s2
-        self._rates_rad_s, self.force_frd_m_s2 = ((p, q, r), w), f
+        self._rates_rad_s, self.force_frd_m_s2, self._shown_m_s2 = ((p, q, r), w), f, f
         if not 0 < elapsed_us < LONGEST_GAP_US:
             self._turns_rad_s2, self.error_m_s2, self.unseen_m_s2, self.spins_per_s2 = ZERO, 0.0, 0.0, 0.0
             return
@@ -96,22 +97,23 @@ class Lever:
             f[2] - i * y + j * x - r * n + square * z,
         )
 
-    def learn(self, off_frd_m_s2: Vector3, variance: float, elapsed_s: float, turns: bool) -> None:
-        """Take by how much the force of a free vehicle, as of that point, is off its mean of MEAN_MEMORY_S.
+    def learn(self, mean_frd_m_s2: Vector3, variance: float, elapsed_s: float, turns: bool) -> None:
+        """Take the newest sample of a free vehicle, whose force at that point had a mean of MEAN_MEMORY_S.
 
-        `variance`: of that without a turn; `turns`: it is one beyond the gyroscopes' noise.
+        `variance`: about it, without a turn; `turns`: it is one beyond the gyroscopes' noise.
         """
-        (p, q, r), (i, j, k) = self._rates_rad_s[0], self._turns_rad_s2
-        h = np.array([[-q * q - r * r, p * q - k, p * r + j], [p * q + k, -p * p - r * r, q * r - i]])
-        self._mean += min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0) * (h - self._mean)
-        h -= self._mean
-        self.has_turned = turns or bool(np.abs(self._mean).max() > reflex.TURNS_PER_S2)
+        (p, q, r), (i, j, k), (x, y, _) = self._rates_rad_s[0], self._turns_rad_s2, self._shown_m_s2
+        shown = np.array([[-q * q - r * r, p * q - k, p * r + j, x], [p * q + k, -p * p - r * r, q * r - i, y]])
         if not self.has_turned:
-            self._mean = np.zeros((2, 3))
+            self._mean = np.array([[0.0, 0.0, 0.0, each] for each in mean_frd_m_s2[:2]])
+        # As the force's mean follows a turn, so does that of H.
+        self._mean += min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0) * (shown - self._mean)
+        self.has_turned = turns or bool(np.abs(self._mean[:, :3]).max() > reflex.TURNS_PER_S2)
+        h, force = np.hsplit(shown - self._mean, [3])
         # All samples within RATE_MEMORY_US count as one: what else pushes lasts.
         share = min(1e6 * elapsed_s / reflex.RATE_MEMORY_US, 1.0)
         self._square += share * h.T @ h
-        self._against += share * h.T @ (off_frd_m_s2[:2] + h @ self.place_frd_m)
+        self._against += share * h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)

@@ -242,7 +242,7 @@ class FusedDetector:
             is_turning = s.turn.turns_rad_s2 > reflex.TURNS_PER_S2 or lever.spins_per_s2 > reflex.TURNS_PER_S2
             if is_turning or lever.has_turned:
                 spread_m_s2 = s.threshold_m_s2 / config.noise_factor
-                lever.learn(minus(f, s.floor.mean_frd_m_s2), spread_m_s2**2, elapsed_s, is_turning)
+                lever.learn(s.floor.mean_frd_m_s2, spread_m_s2**2, elapsed_s, is_turning)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2

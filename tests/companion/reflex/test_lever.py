@@ -2,13 +2,20 @@
 
 import math
 import random
+from typing import Any
 
 import numpy as np
 import pytest
 
-from companion.reflex.config import MEAN_MEMORY_S, TURNS_PER_S2, FusedConfig
+from companion.messages import GpsFix, ImuSample, LocalPosition
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.vector import ZERO
+from companion.reflex.belief.motion_estimator import MotionEstimator
+from companion.reflex.config import TURNS_PER_S2, EstimateConfig, FusedConfig
 from companion.reflex.detection.free_flight import Lever
+from companion.reflex.detection.impact import ImpactEstimator
 from companion.reflex.detection.jumps import RateJump
+from companion.reflex.surface import Contact
 
 WINDOW_US = 4_000
 STEPS = 4  # of a window
@@ -19,7 +26,7 @@ class Turning:
 
     def __init__(self, place_m, burst_rad_s2, every_us=WINDOW_US, yaw_rad_s=0.0, noise_rad_s=0.0, period_s=0.25):
         self.place_m, self.burst_rad_s2, self.every_us = np.array(place_m), burst_rad_s2, every_us
-        self.period_s, self.mean = period_s, np.zeros(3)
+        self.period_s = period_s
         self.rates = np.array([0.0, 0.0, yaw_rad_s])
         self.noise_rad_s, self.rng = noise_rad_s, random.Random(2)
 
@@ -51,8 +58,7 @@ class Turning:
             yield math.hypot(x, y), math.hypot(config.side_threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
             turns = turn.turns_rad_s2 > TURNS_PER_S2 or lever.spins_per_s2 > TURNS_PER_S2
             if turns or lever.has_turned:
-                self.mean += min(1e-6 * self.every_us / MEAN_MEMORY_S, 1.0) * (np.array([x, y, 0.0]) - self.mean)
-                lever.learn(tuple(np.array([x, y, 0.0]) - self.mean), 0.25, 1e-6 * self.every_us, turns)
+                lever.learn(ZERO, 0.25, 1e-6 * self.every_us, turns)
 
 
 @pytest.mark.parametrize(
@@ -112,3 +118,49 @@ def test_across_a_gap_nothing_is_known_of_a_turn() -> None:
     lever.imu(200_000, (1.0, 0.0, -9.8), (3.0, 2.0, 1.0), WINDOW_US)
     assert lever.force_frd_m_s2 == (1.0, 0.0, -9.8)
     assert (lever.error_m_s2, lever.unseen_m_s2) == (0.0, 0.0)
+
+
+PLACE_M = (0.06, -0.02, -0.05)
+
+
+def spinning(rates, turns):
+    """What an accelerometer there shows of it, FRD, beside a hover's thrust."""
+    return np.cross(turns, PLACE_M) + np.cross(rates, np.cross(rates, PLACE_M)) - (0.0, 0.0, GRAVITY_M_S2)
+
+
+def test_a_spin_that_a_hit_leaves_shows_all_of_the_place() -> None:
+    lever, rates = Lever(), np.array([8.0, -6.0, 14.0])
+    lever.imu(WINDOW_US, ZERO, tuple(rates.tolist()), WINDOW_US)  # the contact
+    lever.imu(WINDOW_US, ZERO, tuple(rates.tolist()), WINDOW_US)
+    for _ in range(120):
+        turns = -rates / (0.1, 0.3, 0.2)
+        force, rates = spinning(rates, turns), rates + 0.004 * turns
+        lever.imu(WINDOW_US, tuple(force.tolist()), tuple(rates.tolist()), WINDOW_US)
+        lever.learn(ZERO, 0.2, 0.004, lever.spins_per_s2 > TURNS_PER_S2)
+    assert lever.place_frd_m == pytest.approx(PLACE_M, abs=0.01)
+    assert max(lever.errors_m) < 0.02
+    assert lever.force_frd_m_s2 == pytest.approx((0.0, 0.0, -GRAVITY_M_S2), abs=0.5)
+
+
+def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belief_nor_a_receivers_velocity() -> None:
+    # Given a vehicle at rest in the air whose sensor's place is known
+    source, now_us = ImpactEstimator(EstimateConfig()), 1_000_000
+    source.lever.place_frd_m = PLACE_M
+    source.strapdown.time_boot_us = now_us
+    source.update(LocalPosition(now_us, ZERO, ZERO))
+    contact = Contact(ZERO, ZERO, (-1.0, 0.0, 0.0))
+    source.followed = [found := MotionEstimator(contact, now_us, contact.rebound(0.0), EstimateConfig())]
+    # When it spins up about its thrust within 20 ms, and on for 0.3 s
+    rates: Any = np.zeros(3)
+    for tick in range(80):
+        turns = np.array([0.0, 0.0, 80.0 if tick < 25 else 0.0])
+        rates, now_us = rates + 0.004 * turns, now_us + 4_000
+        force = spinning(rates - 0.002 * turns, turns)
+        source.update(ImuSample(now_us, tuple(force.tolist()), tuple(rates.tolist())))
+        if tick == 15:
+            source.update(LocalPosition(now_us, ZERO, ZERO))
+    # Then the sensor moves, the vehicle does not
+    assert math.hypot(*source.strapdown.sum_ned_m_s) > 0.3
+    assert math.hypot(*found.motion.velocity_ned_m_s) < 0.05 and math.hypot(*found.external_m_s2) < 0.3
+    source.update(GpsFix((0.0, 0.0), 47.0, 8.0, 0.0))
+    assert math.hypot(*source.doppler.velocity_ned_m_s) < 0.05
