@@ -1,9 +1,9 @@
 """A vehicle's own number, learnt in its flight: the slope k of y = -k x + noise, so that y + k x is what it leaves.
 
 Of a velocity, the vehicle's own or a receiver's, it is the delay. One with the delay d differs from the integrated
-accelerometer by -d a, so a change x of the acceleration a is a step y of velocity minus integral. Of a sideways force
-it is how far the accelerometer is below the point that the vehicle turns about. k is the least-squares estimate over
-all pairs, with a prior.
+accelerometer by -d a, so a change x of the acceleration a is a step y of velocity minus integral. A velocity of the
+centre differs from that of an accelerometer beside it by how fast that turns about it. k is the least-squares estimate
+over all pairs, with a prior.
 """
 
 import math

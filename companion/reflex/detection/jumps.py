@@ -77,8 +77,11 @@ class VelocityJump:
     delay: Slope = field(default_factory=lambda: Slope(DELAY_S, DELAY_S, 0.0, LATEST_S))
     variance_m2_s2: float = 0.0
     known: int = 0
-    newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
-    """The newest step without correction for the delay, and the change of the acceleration."""
+    told: Slope = field(default_factory=lambda: Slope(0.0, 1.0, 0.0, 1.0))
+    """1 of a vehicle that tells the velocity of its centre, as where the accelerometer is it has been told; else 0, as
+    PX4's default EKF2_IMU_POS_X, _Y, _Z have it."""
+    newest: tuple[Vector3, Vector3, Vector3] = (ZERO, ZERO, ZERO)
+    """The newest step as it is, the changes of the acceleration and of how fast the accelerometer turns."""
     compared_us: Sequence[int] = ()  # times of the velocities that make it, the newest last
 
     def step_m_s(self, fixes: Sequence[VelocityFix]) -> Vector3 | None:
@@ -98,15 +101,23 @@ class VelocityJump:
         pairs = zip(pairwise(recent), apart_us, strict=True)
         flown = ((minus(b.sum_ned_m_s, a.sum_ned_m_s), 1e-6 * us) for (a, b), us in pairs)
         change = _newest_less_mean((n / over_s, e / over_s, d / over_s) for (n, e, d), over_s in flown)
-        self.newest, self.compared_us = (step, change), times[1:]
-        return plus(step, self.delay.found(self.variance_m2_s2)[0], change)
+        turn = _newest_less_mean(fix.turns_ned_m_s for fix in recent[1:])
+        self.newest, self.compared_us = (step, change, turn), times[1:]
+        return self._less(turn, change)
 
     def learn(self, step: Vector3) -> None:
         """Learn delay and standard deviation from the newest step, limited to what is no hit."""
-        self.delay.learn(*self.newest)
+        _, change, turn = self.newest
+        self.delay.learn(self._less(turn, ZERO), change)
+        self.told.learn(self._less(ZERO, change), turn)
         square = along(step, step) / 3.0
         self.known = min(self.known + 1, MEMORY_STEPS)
         self.variance_m2_s2 += (square - self.variance_m2_s2) / self.known
+
+    def _less(self, turn: Vector3, change: Vector3) -> Vector3:
+        """The newest step less what these explain of it."""
+        delay_s, told = (slope.found(self.variance_m2_s2)[0] for slope in (self.delay, self.told))
+        return plus(plus(self.newest[0], told, turn), delay_s, change)
 
     def least_m_s(self, config: reflex.FusedConfig, caution: float) -> float:
         """The step, m/s, that is a hit; infinite before the first step.

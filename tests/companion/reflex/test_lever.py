@@ -9,12 +9,13 @@ import pytest
 
 from companion.messages import GpsFix, ImuSample, LocalPosition
 from companion.motion.config import GRAVITY_M_S2
+from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
 from companion.reflex.config import TURNS_PER_S2, EstimateConfig, FusedConfig
 from companion.reflex.detection.free_flight import Lever
 from companion.reflex.detection.impact import ImpactEstimator
-from companion.reflex.detection.jumps import RateJump
+from companion.reflex.detection.jumps import RateJump, VelocityJump
 from companion.reflex.surface import Contact
 
 WINDOW_US = 4_000
@@ -164,3 +165,20 @@ def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belie
     assert math.hypot(*found.motion.velocity_ned_m_s) < 0.05 and math.hypot(*found.external_m_s2) < 0.3
     source.update(GpsFix((0.0, 0.0), 47.0, 8.0, 0.0))
     assert math.hypot(*source.doppler.velocity_ned_m_s) < 0.05
+
+
+@pytest.mark.parametrize("is_told", [False, True])
+def test_velocities_are_those_of_the_sensor_or_of_the_centre_as_the_vehicle_has_been_told(is_told) -> None:
+    # Given a vehicle that rolls to and fro, its sensor 0.08 m above the centre, and velocities with 0.01 m/s of noise
+    jump, noise, fixes, sizes = VelocityJump(), random.Random(3), list[VelocityFix](), list[float]()
+    for tick in range(300):
+        turns = (0.0, 0.4 * math.sin(0.9 * tick), 0.0)
+        seen = (noise.gauss(0.0, 0.01), (0.0 if is_told else turns[1]) + noise.gauss(0.0, 0.01), 0.0)
+        fixes.append(VelocityFix(33_000 * tick, seen, turns, turns))
+        step = jump.step_m_s(fixes)
+        if step is not None:
+            sizes.append(math.hypot(*step))
+            jump.learn(step)
+    # Then what is left of either is noise, once that is known
+    assert max(sizes[20:]) < 0.06
+    assert jump.told.found(jump.variance_m2_s2)[0] == pytest.approx(is_told, abs=0.02)
