@@ -62,34 +62,40 @@ class Lever:
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     spins_per_s2: float = 0.0  # square of the rates
     has_turned: bool = False  # so lately that the mean of the force still shows it
-    _rates_rad_s: tuple[Vector3, Vector3] = (ZERO, ZERO)  # of the sample before, and the newest
+    _before_rad_s: Vector3 = ZERO  # rates of the sample before the newest
+    _rates_rad_s: Vector3 = ZERO
     _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
     _shown_m_s2: Vector3 = ZERO  # by the newest sample
+    _since_s: float = 0.0  # the newest that has been learnt from
     _mean: Floats = field(default_factory=lambda: np.zeros((2, 4)))  # of H, and of what is shown of f_x and f_y
     _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     _against: Floats = field(default_factory=lambda: np.zeros(3))
 
-    def imu(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: int) -> None:
+    def imu(self, elapsed_us: int, f: Vector3, w: Vector3, averaging_us: float) -> None:
         """Take force and rates of a sample, the mean of `averaging_us`, `elapsed_us` after the one before it."""
         # Rates of before: a hit has not changed them.
-        (p, q, r), (i, j, _) = self._rates_rad_s[1], self._turns_rad_s2
-        self._rates_rad_s, self.force_frd_m_s2, self._shown_m_s2 = ((p, q, r), w), f, f
+        p, q, r = self._before_rad_s = self._rates_rad_s
+        i, j, _ = self._turns_rad_s2
+        self._rates_rad_s, self.force_frd_m_s2, self._shown_m_s2 = w, f, f
         if not 0 < elapsed_us < LONGEST_GAP_US:
             self._turns_rad_s2, self.error_m_s2, self.unseen_m_s2, self.spins_per_s2 = ZERO, 0.0, 0.0, 0.0
             return
         per_s = 1e6 / elapsed_us
         # What no motor makes is none: of one forged rate it is little.
-        x, y = (w[0] - p) * per_s - i, (w[1] - q) * per_s - j
+        x, y, k = (w[0] - p) * per_s - i, (w[1] - q) * per_s - j, (w[2] - r) * per_s
         changes = math.hypot(x, y)
-        share = min(1.0, MOTORS_RAD_S2 / max(changes, 1.0))
-        k = min(max((w[2] - r) * per_s, -MOTORS_RAD_S2), MOTORS_RAD_S2)
-        self._turns_rad_s2 = i, j, k = i + share * x, j + share * y, k
+        if changes > MOTORS_RAD_S2:
+            x, y, changes = x * MOTORS_RAD_S2 / changes, y * MOTORS_RAD_S2 / changes, MOTORS_RAD_S2
+        if abs(k) > MOTORS_RAD_S2:
+            k = math.copysign(MOTORS_RAD_S2, k)
+        self._turns_rad_s2 = i, j, k = i + x, j + y, k
         square = self.spins_per_s2 = p * p + q * q + r * r
         # That may all have come while the accelerometer measured. Rates differ by what was half an interval ago, too.
-        unseen = min(changes, MOTORS_RAD_S2) * max(0.5, 1.0 - averaging_us / elapsed_us)
+        unseen_share = 1.0 - averaging_us / elapsed_us
         (x, y, z), (x_error, y_error, z_error) = self.place_frd_m, self.errors_m
         self.error_m_s2 = z_error * math.hypot(p * r + j, q * r - i)
-        self.unseen_m_s2 = (abs(z) + z_error) * unseen + max(x_error, y_error) * square
+        self.unseen_m_s2 = (abs(z) + z_error) * changes * (unseen_share if unseen_share > 0.5 else 0.5)
+        self.unseen_m_s2 += (x_error if x_error > y_error else y_error) * square
         n = p * x + q * y + r * z
         self.force_frd_m_s2 = (
             f[0] - j * z + k * y - p * n + square * x,
@@ -102,18 +108,20 @@ class Lever:
 
         `variance`: about it, without a turn; `turns`: it is one beyond the gyroscopes' noise.
         """
-        (p, q, r), (i, j, k), (x, y, _) = self._rates_rad_s[0], self._turns_rad_s2, self._shown_m_s2
+        self._since_s += elapsed_s
+        if 1e6 * self._since_s < reflex.RATE_MEMORY_US:
+            return  # What else pushes lasts: of samples so near to each other one counts.
+        share, self._since_s = min(self._since_s / reflex.MEAN_MEMORY_S, 1.0), 0.0
+        (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
         shown = np.array([[-q * q - r * r, p * q - k, p * r + j, x], [p * q + k, -p * p - r * r, q * r - i, y]])
         if not self.has_turned:
             self._mean = np.array([[0.0, 0.0, 0.0, each] for each in mean_frd_m_s2[:2]])
         # As the force's mean follows a turn, so does that of H.
-        self._mean += min(elapsed_s / reflex.MEAN_MEMORY_S, 1.0) * (shown - self._mean)
+        self._mean += share * (shown - self._mean)
         self.has_turned = turns or bool(np.abs(self._mean[:, :3]).max() > reflex.TURNS_PER_S2)
         h, force = np.hsplit(shown - self._mean, [3])
-        # All samples within RATE_MEMORY_US count as one: what else pushes lasts.
-        share = min(1e6 * elapsed_s / reflex.RATE_MEMORY_US, 1.0)
-        self._square += share * h.T @ h
-        self._against += share * h.T @ force[:, 0]
+        self._square += h.T @ h
+        self._against += h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)

@@ -98,7 +98,7 @@ class ImpactEstimator(Motion):
         if isinstance(sample, ImuSample):
             f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
             elapsed_us = sample.time_boot_us - self.strapdown.time_boot_us
-            self.lever.imu(elapsed_us, f, w, round(1e6 * self.config.imu_averaging_interval_s))
+            self.lever.imu(elapsed_us, f, w, 1e6 * self.config.imu_averaging_interval_s)
             self.strapdown.imu(sample.time_boot_us, f, w, self.lever.force_frd_m_s2)
             self.strapdown.sensor_frd_m = self.lever.place_frd_m
             self.earlier_imu, self.imu = self.imu, sample
