@@ -227,7 +227,7 @@ FREE = {0, 1, 2, 0.5, 1e6, 1e-6, 0.5e-6, 1e3, 100, 1e-9}
 DERIVED = {
     "reflex/detection/jumps.py": {3},  # axes; Student's t by degrees of freedom
     "reflex/belief/filter_bank.py": {3},  # axes
-    "reflex/detection/free_flight.py": {3},  # axes
+    "reflex/detection/free_flight.py": {3, 4},  # axes, and a column more
     "reflex/detection/impact.py": {4},  # a beginning that is known by two windows: half of half a window
     "reflex/detection/monitor.py": {3},  # shown decimals
     "reflex/detection/health.py": {3, 3600},  # shown decimals; seconds an hour
