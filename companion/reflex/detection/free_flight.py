@@ -66,7 +66,9 @@ class Lever:
     _rates_rad_s: Vector3 = ZERO
     _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
     _shown_m_s2: Vector3 = ZERO  # by the newest sample
-    _since_s: float = 0.0  # the newest that has been learnt from
+    _samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = field(default_factory=list)
+    """H, and what is shown of f_x and f_y, of those to be learnt from; they are, every RATE_MEMORY_US."""
+    _since_s: float = 0.0
     _mean: Floats = field(default_factory=lambda: np.zeros((2, 4)))  # of H, and of what is shown of f_x and f_y
     _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     _against: Floats = field(default_factory=lambda: np.zeros(3))
@@ -108,18 +110,20 @@ class Lever:
 
         `variance`: about it, without a turn; `turns`: it is one beyond the gyroscopes' noise.
         """
+        (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
+        rows = (-q * q - r * r, p * q - k, p * r + j, x), (p * q + k, -p * p - r * r, q * r - i, y)
+        self._samples.append(rows)
         self._since_s += elapsed_s
         if 1e6 * self._since_s < reflex.RATE_MEMORY_US:
-            return  # What else pushes lasts: of samples so near to each other one counts.
-        share, self._since_s = min(self._since_s / reflex.MEAN_MEMORY_S, 1.0), 0.0
-        (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
-        shown = np.array([[-q * q - r * r, p * q - k, p * r + j, x], [p * q + k, -p * p - r * r, q * r - i, y]])
+            return
+        shown, share = np.array(self._samples), min(self._since_s / reflex.MEAN_MEMORY_S, 1.0)
+        self._samples, self._since_s = [], 0.0
         if not self.has_turned:
             self._mean = np.array([[0.0, 0.0, 0.0, each] for each in mean_frd_m_s2[:2]])
         # As the force's mean follows a turn, so does that of H.
-        self._mean += share * (shown - self._mean)
+        self._mean += share * (shown.mean(axis=0) - self._mean)
         self.has_turned = turns or bool(np.abs(self._mean[:, :3]).max() > reflex.TURNS_PER_S2)
-        h, force = np.hsplit(shown - self._mean, [3])
+        h, force = np.split((shown - self._mean).reshape(-1, 4), [3], axis=1)
         self._square += h.T @ h
         self._against += h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
