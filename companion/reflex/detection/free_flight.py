@@ -57,7 +57,7 @@ class Lever:
 
     place_frd_m: Vector3 = ZERO
     errors_m: Vector3 = (reflex.LEVER_M, reflex.LEVER_M, reflex.LEVER_M)  # standard deviations
-    force_frd_m_s2: Vector3 = ZERO  # of the newest sample, at that point
+    force_frd_m_s2: Vector3 = ZERO  # of the newest sample, sideways as at that point
     error_m_s2: float = 0.0  # standard deviation of its sideways part, by that of the height
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     spins_per_s2: float = 0.0  # square of the rates
@@ -102,7 +102,7 @@ class Lever:
         self.force_frd_m_s2 = (
             f[0] - j * z + k * y - p * n + square * x,
             f[1] - k * x + i * z - q * n + square * y,
-            f[2] - i * y + j * x - r * n + square * z,
+            f[2],
         )
 
     def learn(self, mean_frd_m_s2: Vector3, variance: float, elapsed_s: float, turns: bool) -> None:
@@ -116,16 +116,17 @@ class Lever:
         self._since_s += elapsed_s
         if 1e6 * self._since_s < reflex.RATE_MEMORY_US:
             return
-        shown, share = np.array(self._samples), min(self._since_s / reflex.MEAN_MEMORY_S, 1.0)
-        self._samples, self._since_s = [], 0.0
+        # Their mean: the gyroscopes' noise in H would make the place nearer.
+        count, shown = len(self._samples), np.mean(self._samples, axis=0)
+        share, self._samples, self._since_s = min(self._since_s / reflex.MEAN_MEMORY_S, 1.0), [], 0.0
         if not self.has_turned:
             self._mean = np.array([[0.0, 0.0, 0.0, each] for each in mean_frd_m_s2[:2]])
         # As the force's mean follows a turn, so does that of H.
-        self._mean += share * (shown.mean(axis=0) - self._mean)
+        self._mean += share * (shown - self._mean)
         self.has_turned = turns or bool(np.abs(self._mean[:, :3]).max() > reflex.TURNS_PER_S2)
-        h, force = np.split((shown - self._mean).reshape(-1, 4), [3], axis=1)
-        self._square += h.T @ h
-        self._against += h.T @ force[:, 0]
+        h, force = np.hsplit(shown - self._mean, [3])
+        self._square += count * h.T @ h
+        self._against += count * h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)
