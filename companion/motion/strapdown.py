@@ -40,7 +40,7 @@ class Strapdown:
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
     sensor_frd_m: Vector3 = ZERO  # where the accelerometer is, from the centre, about which the vehicle turns
-    centre_frd_m_s2: Vector3 = ZERO  # specific force there
+    centre_frd_m_s2: Vector3 = ZERO  # specific force, sideways as there
     valid_wxyz: Quaternion = LEVEL
     """At the newest sample: the last valid attitude, carried on by the rates.
 

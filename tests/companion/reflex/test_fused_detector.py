@@ -287,6 +287,21 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     assert flight.state.side_threshold_m_s2(FusedConfig(), flight.motion.lever) == pytest.approx(most_m_s2, rel=0.1)
 
 
+def test_a_spin_about_the_thrust_shows_where_the_sensor_is_though_drag_changes_with_it():
+    # Given a sensor 0.06 m ahead, a vehicle that spins to and fro, and 1 m/s^2 of drag since it first did
+    def yaw_rad_s(t_us):
+        return 6.0 * math.sin(0.5e-6 * math.pi * max(t_us - 1_500_000, 0))
+
+    def push(t_us):
+        turns_rad_s2 = 1e3 * (yaw_rad_s(t_us) - yaw_rad_s(t_us - 1_000))
+        return (1.0 * (t_us > 1_500_000) - 0.06 * yaw_rad_s(t_us) ** 2, 0.06 * turns_rad_s2, 0.0)
+
+    flight = Flight(push, rates=lambda t_us: (0.0, 0.0, yaw_rad_s(t_us)), heard=(Attitude, AttitudeTarget))
+    # When it flies on, then that is learnt of it, and nothing was a hit
+    assert flight.fly(7_500_000) == []
+    assert flight.motion.lever.place_frd_m == pytest.approx((0.06, 0.0, 0.0), abs=0.01)
+
+
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
     once = Flight(pulse((0.0, 10.5, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
     assert once.fly() == [] and once.state.threshold_m_s2 > 8.0

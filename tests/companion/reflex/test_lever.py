@@ -95,8 +95,9 @@ def test_a_turn_about_two_axes_at_once_is_taken_off_once_the_height_is_known() -
     assert math.hypot(*lever.force_frd_m_s2[:2]) < 1e-6
 
 
-def test_the_height_is_learnt_beside_the_gyroscopes_noise() -> None:
-    lever, turning = Lever(), Turning((0.0, 0.0, -0.07), 40.0, noise_rad_s=0.005)
+@pytest.mark.parametrize("noise_rad_s", [0.005, 0.03])
+def test_the_height_is_learnt_however_noisy_the_gyroscopes_are(noise_rad_s) -> None:
+    lever, turning = Lever(), Turning((0.0, 0.0, -0.07), 40.0, noise_rad_s=noise_rad_s)
     list(turning.fly(lever, 12.0))
     assert lever.place_frd_m[2] == pytest.approx(-0.07, rel=0.1)
     assert lever.errors_m[2] < 0.01
@@ -141,6 +142,14 @@ def test_a_spin_that_a_hit_leaves_shows_all_of_the_place() -> None:
     assert lever.place_frd_m == pytest.approx(PLACE_M, abs=0.01)
     assert max(lever.errors_m) < 0.02
     assert lever.force_frd_m_s2[:2] == pytest.approx((0.0, 0.0), abs=0.5)
+
+
+def test_a_spin_that_goes_on_as_fast_teaches_no_more_as_that_may_be_drag() -> None:
+    lever, rates = Lever(), np.array([0.0, 0.0, 5.0])
+    for _ in range(1000):
+        lever.imu(WINDOW_US, tuple(spinning(rates, ZERO).tolist()), tuple(rates.tolist()), WINDOW_US)
+        lever.learn(ZERO, 0.2, 0.004, lever.spins_per_s2 > TURNS_PER_S2)
+    assert lever.errors_m[0] > 0.002
 
 
 def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belief_nor_a_receivers_velocity() -> None:
