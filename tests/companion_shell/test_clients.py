@@ -6,7 +6,6 @@ import time
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.errors import AddressError
 from companion.guard.between import Between
 from companion.shell.connections.addresses import open_connection
 from companion.shell.connections.clients import MOST_CLIENTS, UNREAD_BYTES, SharedConnection, carried_bytes_s
@@ -159,19 +158,6 @@ def test_of_more_clients_than_there_is_room_for_the_next_is_named(bench):
         bench.run()
     news = bench.shared.news()
     assert news is not None and f":{clients[-1].getsockname()[1]} sends to the clients' port, too" in news
-
-
-@pytest.mark.parametrize(
-    ("url", "says"),
-    [
-        ("serial:///dev/ttyUSB0:57600", "clients come by udpin://HOST:PORT, udpout://HOST:PORT or tcpin://HOST:PORT"),
-        ("udpout://0.0.0.0:14540", "names any host"),
-    ],
-)
-def test_an_address_that_is_none_for_clients_is_one_sentence(url, says):
-    vehicle = open_connection(f"udpout://{LOOPBACK}:1")
-    with pytest.raises(AddressError, match=says):
-        SharedConnection(vehicle, [url], Between(1.0))
 
 
 def test_what_a_serial_line_carries_follows_from_its_baud_rate():
