@@ -1,5 +1,7 @@
 """One flight into the wall for all who look at its folder."""
 
+import shutil
+
 import pytest
 
 from rebound_cli.report.shown_flight import recorded_flight
@@ -16,6 +18,12 @@ def wall_flight(tmp_path_factory):
 @pytest.fixture(scope="session")
 def wall_folder(wall_flight):
     return wall_flight[0]
+
+
+@pytest.fixture
+def copied(wall_folder, tmp_path):
+    """A copy to spoil."""
+    return shutil.copytree(wall_folder, tmp_path / "wall")
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """`rebound replay` and `tune`: each decision again, to the bit; logs through the watch; margins and settings to use."""
 
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +24,6 @@ from rebound_cli.replay.watching import Circumstances, watch_log
 from tests.rebound_cli.command import WALL, assert_comes_again
 from tests.rebound_cli.logs.test_ulog import every, sensor_combined, ulog
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
-
-
-@pytest.fixture
-def copied(wall_folder, tmp_path):
-    """A copy to spoil."""
-    return shutil.copytree(wall_folder, tmp_path / "wall")
 
 
 def said(capsys, *words):

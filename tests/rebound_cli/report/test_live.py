@@ -4,7 +4,6 @@ import http.client
 import io
 import json
 import random
-import shutil
 import socket
 import threading
 from contextlib import closing, contextmanager
@@ -141,13 +140,12 @@ def test_what_is_none_of_the_pages_business_is_refused(wall_folder):
         assert {asked(server, "/", host=host).status for host in ("localhost", "localhost:80")} == {200}
 
 
-def test_an_address_that_cannot_be_had_and_damaged_events_are_a_sentence(wall_folder, tmp_path, capsys):
-    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
-    (folder / "events.jsonl").write_text("{}\n")
-    with served(folder) as server:
+def test_an_address_that_cannot_be_had_and_damaged_events_are_a_sentence(copied, capsys):
+    (copied / "events.jsonl").write_text("{}\n")
+    with served(copied) as server:
         for host in ("127.0.0.1", "a..b"):
             with pytest.raises(ReboundError, match=r"nothing can be served there.*; give another --host or --port"):
-                WatchServer(folder, host, server.server_port)
+                WatchServer(copied, host, server.server_port)
         server.reader.join(5)
     assert capsys.readouterr().err.endswith("events.jsonl:1: not what a flight leaves there; the file is damaged.\n")
 

@@ -5,7 +5,6 @@ import hashlib
 import io
 import json
 import re
-import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -286,18 +285,17 @@ def test_without_position_no_place_is_left(wall_folder, tmp_path, capsys):
     assert len(opened.table("imu")["fx"]) > 5000
 
 
-def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
+def test_a_guards_folder_has_one_too(wall_folder, copied):
     # Given what a guard would have heard of the same flight
-    folder = shutil.copytree(wall_folder, tmp_path / "guard")
     for name in ("resolved.yaml", "mission.yaml", "airframe.yaml", "truth.npz", "obstacles.json", "report.html"):
-        (folder / name).unlink()
+        (copied / name).unlink()
     flown = yaml.safe_load((wall_folder / "resolved.yaml").read_text())
     guarded = {"companion": {"estimate": flown["companion"]["estimate"]}}
-    (folder / "guard.yaml").write_text(yaml.safe_dump(guarded))
-    (folder / "events.jsonl").write_text("")
+    (copied / "guard.yaml").write_text(yaml.safe_dump(guarded))
+    (copied / "events.jsonl").write_text("")
     summary = {"outcome": "stopped with Ctrl-C", "collisions": [], "left_alone": 1, "round_trip_ms": {"median": None}}
-    (folder / "summary.json").write_text(json.dumps(summary))
-    data = Opened(page(recorded_flight(folder))).data
+    (copied / "summary.json").write_text(json.dumps(summary))
+    data = Opened(page(recorded_flight(copied))).data
     assert data["sentence"].startswith("Hit a wall at 1.9") and data["sentence"].endswith("stopped with Ctrl-C.")
     assert data["obstacles"] == [] and "truth" not in data["tables"]
 
@@ -348,28 +346,25 @@ def truth_of(**series):
         ("obstacles.json", b"["),
     ],
 )
-def test_of_a_folder_with_a_damaged_file_there_is_a_sentence(wall_folder, tmp_path, capsys, name, content):
-    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
-    (folder / name).write_bytes(content)
-    assert main(["report", str(folder)]) == 1
+def test_of_a_folder_with_a_damaged_file_there_is_a_sentence(copied, capsys, name, content):
+    (copied / name).write_bytes(content)
+    assert main(["report", str(copied)]) == 1
     assert re.fullmatch(rf"rebound: .*{name}: .+ the file is damaged\.\n", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("content", [b"name: foldable", b"name: [", b"\xff"])
-def test_without_a_whole_airframe_the_flight_is_shown_and_it_is_said(wall_folder, tmp_path, content):
-    folder = shutil.copytree(wall_folder, tmp_path / "damaged")
-    (folder / "airframe.yaml").write_bytes(content)
+def test_without_a_whole_airframe_the_flight_is_shown_and_it_is_said(copied, content):
+    (copied / "airframe.yaml").write_bytes(content)
     with pytest.warns(UserWarning, match="airframe.yaml.*; the flight is shown without it"):
-        data = Opened(page(recorded_flight(folder))).data
+        data = Opened(page(recorded_flight(copied))).data
     assert data["obstacles"] and len(data["vehicle"]["arms"]) == 4
 
 
-def test_a_flight_that_was_cut_off_has_one_and_one_in_which_nothing_was_heard_has_none(wall_folder, tmp_path, capsys):
-    folder = shutil.copytree(wall_folder, tmp_path / "cut")
-    (folder / "summary.json").unlink()
-    assert "the recording was cut off" in Opened(page(recorded_flight(folder))).data["sentence"]
-    (folder / "flight.tlog").write_bytes(b"")
-    (folder / "report.html").unlink()
-    assert main(["report", str(folder)]) == 1
+def test_a_flight_that_was_cut_off_has_one_and_one_in_which_nothing_was_heard_has_none(copied, capsys):
+    (copied / "summary.json").unlink()
+    assert "the recording was cut off" in Opened(page(recorded_flight(copied))).data["sentence"]
+    (copied / "flight.tlog").write_bytes(b"")
+    (copied / "report.html").unlink()
+    assert main(["report", str(copied)]) == 1
     assert "nothing was ever heard in this flight" in capsys.readouterr().err
-    assert not (folder / "report.html").exists()
+    assert not (copied / "report.html").exists()
