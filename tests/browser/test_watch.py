@@ -1,10 +1,10 @@
 """`rebound watch` beside a flight in real time: a browser sees it, and none disturbs it."""
 
 import json
-import os
 import re
 import time
 
+import psutil
 import pytest
 
 from tests.browser.opened_page import drawn_share, line_share
@@ -39,10 +39,9 @@ def watched(flown):
 
 
 def cpu_s(process):
-    """What it has computed so far: user and system time, by proc(5)."""
-    with open(f"/proc/{process.pid}/stat") as file:
-        fields = file.read().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """What it has computed so far."""
+    times = psutil.Process(process.pid).cpu_times()
+    return times.user + times.system
 
 
 def wait_for(shown, kind):

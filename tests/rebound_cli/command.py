@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 from pymavlink import mavutil
 
 from rebound_cli.main import main
@@ -86,16 +87,8 @@ def taken_off(vehicle):
 
 
 def processes_naming(text):
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                command = (entry / "cmdline").read_bytes()
-            except OSError:
-                continue
-            if str(text).encode() in command:
-                found.append(int(entry.name))
-    return found
+    """By their numbers."""
+    return [each.pid for each in psutil.process_iter(["cmdline"]) if str(text) in " ".join(each.info["cmdline"] or ())]
 
 
 def wait_until_there(text, is_there=True):
