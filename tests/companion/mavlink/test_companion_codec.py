@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import development as mav
 from companion import messages as ours
 from companion.mavlink.decode import WRAP_US, Decoder
 from companion.mavlink.encode import Encoder
-from companion.mavlink.packet import payload_of, sequence_of
+from companion.mavlink.packet import payload_of
 from companion.mavlink.readers import GUARD_READERS, Reader
 from tests.filled import example
 
@@ -251,12 +251,6 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
     assert math.isnan(m.yaw_rate)
     assert (m.vx, m.vy, m.vz) == velocity if velocity else math.isnan(m.vx)
     assert m.yaw == yaw if yaw is not None else math.isnan(m.yaw)
-
-
-def test_packets_are_counted_in_one_byte():
-    encoder = Encoder()
-    packets = [packet for _ in range(258) for packet in encoder.packets(ours.OnboardHeartbeat(True))]
-    assert [sequence_of(packet) for packet in packets] == [*range(256), 0, 1]
 
 
 @pytest.mark.parametrize("kept", [0, 1, 3, 100])
