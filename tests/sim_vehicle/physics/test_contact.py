@@ -9,10 +9,11 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.inertia import ZZ
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
-from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, first_hit, motors_off, quiet, throw
+from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, first_hit, motors_off, quiet, throw, thrown
 
 # The two airframes of the paper without noise.
 FOLDABLE, RIGID = (quiet(load_built_in(name)) for name in ("foldable", "rigid"))
+WALL = {"walls": [{"point_ned_m": [2, 0, -3], "normal_ned": [-1, 0, 0]}]}
 
 
 @pytest.mark.parametrize("speed_m_s", [0.5, 1.0, 1.4])
@@ -43,12 +44,9 @@ def test_a_leaning_hoop_touches_with_its_forward_edge(lean_deg: float) -> None:
     """Leaning 6 degrees, the front of a flat disc is 1.9 cm off the centre's height; the hoop's edge takes back 1.5."""
 
     def spun(airframe: Airframe) -> float:
-        wall = {"point_ned_m": [2, 0, -3], "normal_ned": [-1, 0, 0]}
-        plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
-        plant.place((1.7, 0.0, -3.0), (2.0, 0.0, 0.0))
-        half = math.radians(lean_deg) / 2
-        plant.state.body[6:10] = [math.cos(half), 0.0, math.sin(half), 0.0]
-        assert motors_off(plant, 0.16).truth.hits
+        lean = (0.0, math.tan(math.radians(lean_deg) / 2))
+        plant = thrown(airframe, WALL, (1.7, 0.0, -3.0), lean=lean, duration_s=0.16)
+        assert plant.truth.hits
         return float(plant.state.body[11])
 
     smooth = quiet(FOLDABLE, surface__guard_friction=0.0)
@@ -84,10 +82,7 @@ def test_friction_along_the_wall_is_coulombs(friction: float) -> None:
     """A guard hit square on while the vehicle slides east: what the wall takes along is the coefficient times
     what it gives across (through the centre of mass, so that nothing turns but slowly)."""
     airframe = quiet(load_built_in("foldable"), surface__guard_friction=friction, inertia_kg_m2=(9.0, 9.0, 9.0))
-    wall = {"point_ned_m": [2, 0, -2], "normal_ned": [-1, 0, 0]}
-    plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
-    plant.state.body[0:6] = [1.5, 0.0, -2.0, 1.0, 2.0, 0.0]
-    (hit,) = motors_off(plant, 0.5).truth.hits
+    (hit,) = thrown(airframe, WALL, (1.5, 0.0, -3.0), (1.0, 2.0, 0.0), duration_s=0.5).truth.hits
     across = hit.impact_velocity_ned_m_s[0] - hit.rebound_velocity_ned_m_s[0]
     along = hit.impact_velocity_ned_m_s[1] - hit.rebound_velocity_ned_m_s[1]
     fallen = hit.rebound_velocity_ned_m_s[2] - hit.impact_velocity_ned_m_s[2]
@@ -154,8 +149,8 @@ def test_what_clipping_hides_is_missing_in_the_velocity(name: str, speed_m_s: fl
 
 def test_a_hit_within_the_sensors_range_or_without_the_effect_is_known_whole() -> None:
     """Given 0.3 m/s on springs, then nothing is missing."""
-    for thrown in (throw(airframe("foldable"), 0.3), throw(airframe("rigid", None), 3.0)):
-        assert error_after(thrown) == pytest.approx(np.zeros(6), abs=1e-12)
+    for plant in (throw(airframe("foldable"), 0.3), throw(airframe("rigid", None), 3.0)):
+        assert error_after(plant) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
 # Of what was hidden, what a real PX4's velocity lacked so long after the hit: the mean of fourteen, by motion capture.

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.plant.plant import Plant
-from sim_vehicle.scene import Scene
-from tests.sim_vehicle.physics.throwing import motors_off, quiet
+from tests.sim_vehicle.physics.throwing import quiet, thrown
 
 HEIGHT_M = 8.0
 POLE = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.1, "height_m": 30}]}
@@ -27,25 +25,6 @@ SCENES = {
 
 def smooth(name: str) -> Airframe:
     return quiet(load_built_in(name), surface__guard_friction=0.0)
-
-
-def thrown(
-    airframe: Airframe,
-    scene: dict,
-    position=(1.5, 0.0, -HEIGHT_M),
-    velocity=(2.0, 0.0, 0.0),
-    yaw_rad=0.0,
-    rates=(0.0, 0.0, 0.0),
-    lean=(0.0, 0.0),
-    duration_s=0.48,
-) -> Plant:
-    """A vehicle without thrust, let go among obstacles; ``lean``: its quaternion's x and y, before it has length 1."""
-    plant = Plant(airframe, Scene.model_validate(scene), seed=1)
-    plant.place(position, velocity)
-    attitude_wxyz = np.array([math.cos(yaw_rad / 2), *lean, math.sin(yaw_rad / 2)])
-    plant.state.body[6:10] = attitude_wxyz / np.linalg.norm(attitude_wxyz)
-    plant.state.body[10:13] = rates
-    return motors_off(plant, duration_s)
 
 
 @pytest.mark.parametrize("offset_m", [0.0, 0.03, 0.1, 0.2, -0.25])

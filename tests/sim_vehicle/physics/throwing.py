@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.setpoint import Setpoint
 from sim_vehicle.estimator.estimate import Estimate
@@ -45,11 +47,28 @@ def motors_off(plant: Plant, seconds: float) -> Plant:
     return plant
 
 
+def thrown(
+    airframe: Airframe,
+    scene: dict,
+    position=(1.5, 0.0, -8.0),
+    velocity=(2.0, 0.0, 0.0),
+    yaw_rad=0.0,
+    rates=(0.0, 0.0, 0.0),
+    lean=(0.0, 0.0),
+    duration_s=0.48,
+) -> Plant:
+    """A vehicle without thrust, let go among obstacles; ``lean``: its quaternion's x and y, before it has length 1."""
+    plant = Plant(airframe, Scene.model_validate(scene), seed=1)
+    plant.place(position, velocity)
+    attitude_wxyz = np.array([math.cos(yaw_rad / 2), *lean, math.sin(yaw_rad / 2)])
+    plant.state.body[6:10] = attitude_wxyz / np.linalg.norm(attitude_wxyz)
+    plant.state.body[10:13] = rates
+    return motors_off(plant, duration_s)
+
+
 def released(airframe: Airframe, seconds: float, **scene: object) -> Plant:
     """High up, at rest, and let go."""
-    plant = Plant(airframe, Scene.model_validate(scene), seed=1)
-    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
-    return motors_off(plant, seconds)
+    return thrown(airframe, scene, (0.0, 0.0, -50.0), (0.0, 0.0, 0.0), duration_s=seconds)
 
 
 def throw(
