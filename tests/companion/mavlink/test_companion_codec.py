@@ -276,13 +276,6 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
             assert value == (tuple(found) if isinstance(found := getattr(theirs, name), list) else found), name
 
 
-def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
-    m = sent(ours.AttitudeSetpoint(WRAP_US + 2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625, 1.5))
-    assert m.get_type() == "SET_ATTITUDE_TARGET"
-    assert (m.type_mask, m.target_system, m.target_component, m.time_boot_ms) == (0x03, 7, 1, 2000)
-    assert (m.q, m.thrust, m.body_yaw_rate) == ([0.5, 0.5, -0.5, 0.5], 0.625, 1.5)
-
-
 @pytest.mark.parametrize(
     ("outgoing", "fields"),
     [
@@ -295,6 +288,12 @@ def test_an_attitude_leaves_the_rates_of_roll_and_pitch_to_the_vehicle():
         (
             ours.NamedValue(1_500_000, "rb_v_c", (2.0, -1.0, 0.5)),
             {"name": "rb_v_c", "x": 2.0, "y": -1.0, "z": 0.5, "time_usec": 1_500_000},
+        ),
+        # An attitude leaves the rates of roll and pitch to the vehicle
+        (
+            ours.AttitudeSetpoint(WRAP_US + 2_000_000, (0.5, 0.5, -0.5, 0.5), 0.625, 1.5),
+            {"type_mask": 0x03, "target_system": 7, "target_component": 1, "time_boot_ms": 2000}
+            | {"q": [0.5, 0.5, -0.5, 0.5], "thrust": 0.625, "body_yaw_rate": 1.5},
         ),
     ],
     ids=lambda value: type(value).__name__,
