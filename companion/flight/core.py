@@ -54,6 +54,7 @@ class Core(ABC, Generic[FlightT]):
         self._sent: Target | None = None  # as last sent, in the vehicle's view
         self._leans: bool | None = None  # by attitude, or by position; None while another may send setpoints
         self._law = CommandClient()  # what the vehicle is told of it, until it has answered
+        self._untold: list[Event] = []  # of the last step, to the operator
         self.stop_reason: str | None = None
         self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
         self.begin(0)
@@ -86,13 +87,14 @@ class Core(ABC, Generic[FlightT]):
         if now_us >= self._heartbeat_due_us and not self.handler.finished:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             flight.outbox.append(OnboardHeartbeat(self.handler.is_active))
-        if flight.events or self._texts.waiting or now_us >= self._values_due_us:
+        if self._untold or self.handler.finished or self._texts.waiting or now_us >= self._values_due_us:
             try:
                 self._inform(now_us)
             except Exception as error:
                 self.fault(error, now_us)
         sent, told = flight.outbox, flight.events
         flight.outbox, flight.events = [], []
+        self._untold = [] if self.handler.finished else told
         return sent, told
 
     def fault(self, error: Exception, now_us: int) -> None:
@@ -315,16 +317,20 @@ class Core(ABC, Generic[FlightT]):
         return self.handler.finished and self._law.pending is None
 
     def _inform(self, now_us: int) -> None:
-        """Send the operator's texts with their events, and numbers at their rate, once a vehicle is connected."""
-        flight, texts = self.flight, self._texts
+        """Send the operator's texts and numbers, at their rate, once a vehicle is connected.
+
+        Those of a step's events go with the next one: its setpoint does not wait for them.
+        """
+        flight, texts, is_last = self.flight, self._texts, self.handler.finished
         if flight.vehicle.identity is None:
             return
         operator, hits = flight.mission.companion.operator, len(flight.collisions)
         if operator.status_texts:
-            told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
+            events = [*self._untold, *(flight.events if is_last else ())]
+            told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in events]
             going = [(kind, text) for kind, text in told if text is not None]
-            flight.outbox += texts.due(going, self.handler.finished, now_us)
-        if operator.values_hz and now_us >= self._values_due_us and not self.handler.finished:
+            flight.outbox += texts.due(going, is_last, now_us)
+        if operator.values_hz and now_us >= self._values_due_us and not is_last:
             self._values_due_us = now_us + round(1e6 / operator.values_hz)
             latest = flight.collisions[-1] if flight.collisions else None
             flight.outbox += values(self.state, self.reflex.monitor, latest, hits, now_us - self.started_at_us)
@@ -336,7 +342,7 @@ class Core(ABC, Generic[FlightT]):
 
     def is_due(self, now_us: int) -> bool:
         """Whether a step is due although no sample came."""
-        return now_us >= self.next_deadline_us() or bool(self.flight.events or self.flight.outbox)
+        return now_us >= self.next_deadline_us() or bool(self._untold or self.flight.events or self.flight.outbox)
 
     def collisions(self) -> tuple[CollisionReport, ...]:
         """All collisions so far."""

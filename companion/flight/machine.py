@@ -12,8 +12,8 @@ from companion.flight.handlers.connecting import Connect, Ready
 from companion.flight.handlers.crash import Crashed, crashed
 from companion.flight.handlers.ending import FOLLOWING, ON_THE_GROUND, HandOver, Released, early_end
 from companion.flight.handlers.progress import FlyHome, FlyItems, HoldAfterRecovery
-from companion.flight.handlers.recovering import record_collision
-from companion.flight.handlers.takeoff_and_landing import Land, RecoverInOffboard, TakeOff
+from companion.flight.handlers.recovering import RecoverInOffboard, record_collision
+from companion.flight.handlers.takeoff_and_landing import Land, TakeOff
 from companion.flight.obstacle_map import remember
 from companion.flight.states import FINAL_STATES, IN_THE_AIR, TABLE, State, Trigger
 from companion.flight.vehicle_update import situation_of

@@ -3,8 +3,12 @@
 from companion.flight.after_hit import take_back
 from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
+from companion.flight.states import Trigger
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.collision import Progress
+
+# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
+LEAD_US = 40_000
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
@@ -86,3 +90,33 @@ class Recover(Handler[FlightT]):
         self._hit.is_over = True
         flight.target = Target(self._hit.setpoint_ned_m, flight.yaw_rad)
         return flight.after_recovery
+
+
+class RecoverInOffboard(Recover[FlightContext]):
+    """A recovery. Out of the land mode its setpoints come first, then OFFBOARD, in which alone they are flown.
+
+    A vehicle that does not take the mode goes on landing by itself, and is left to it.
+    """
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        super().__init__(flight, now_us)
+        offboard = flight.vehicle.autopilot.setpoints
+        # Of a second hit the first one's request may be on its way.
+        is_asked = flight.command_client.requested_mode == offboard
+        self._ask_us = now_us + (0 if is_asked or flight.expected_mode == offboard else LEAD_US)
+        if not is_asked:
+            flight.count_asked_mode()
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        offboard = flight.vehicle.autopilot.setpoints
+        is_taken = flight.own_modes == (offboard, None)  # it flies setpoints, and nothing else is asked for
+        if not is_taken and now_us >= self._ask_us:
+            if flight.command_client.requested_mode != offboard:
+                flight.ask_for_mode(offboard)
+            outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
+            if outcome is not None and not outcome.succeeded:
+                text = f"no recovery from a hit in the landing: {outcome.text}"
+                return Transition(Trigger.INTERRUPTED, text, is_left=True)
+            if outcome is not None:
+                flight.expected_mode = offboard
+        return super().step(flight, inputs, now_us)

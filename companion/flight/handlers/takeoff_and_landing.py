@@ -1,10 +1,9 @@
-"""State takeoff: setpoints, OFFBOARD, arm, climb. State landing: PX4's own land mode, and out of it after a hit."""
+"""State takeoff: setpoints, OFFBOARD, arm, climb. State landing: PX4's own land mode."""
 
 import math
 
 from companion.flight.context import FlightContext, Handler, Inputs, Target, Transition, as_text
 from companion.flight.handlers.ending import may_ask
-from companion.flight.handlers.recovering import Recover
 from companion.flight.states import Trigger
 from companion.memory.patch import mean_of
 from companion.messages import ARM, LandedState, Vector3, take_off
@@ -220,37 +219,3 @@ class Land(Handler[FlightContext]):
 
 def _is_high(flight: FlightContext) -> bool:
     return flight.height_m is not None and flight.height_m >= flight.mission.companion.min_detection_height_m
-
-
-# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
-LEAD_US = 40_000
-
-
-class RecoverInOffboard(Recover[FlightContext]):
-    """A recovery. Out of the land mode its setpoints come first, then OFFBOARD, in which alone they are flown.
-
-    A vehicle that does not take the mode goes on landing by itself, and is left to it.
-    """
-
-    def __init__(self, flight: FlightContext, now_us: int) -> None:
-        super().__init__(flight, now_us)
-        offboard = flight.vehicle.autopilot.setpoints
-        # Of a second hit the first one's request may be on its way.
-        is_asked = flight.command_client.requested_mode == offboard
-        self._ask_us = now_us + (0 if is_asked or flight.expected_mode == offboard else LEAD_US)
-        if not is_asked:
-            flight.count_asked_mode()
-
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        offboard = flight.vehicle.autopilot.setpoints
-        is_taken = flight.own_modes == (offboard, None)  # it flies setpoints, and nothing else is asked for
-        if not is_taken and now_us >= self._ask_us:
-            if flight.command_client.requested_mode != offboard:
-                flight.ask_for_mode(offboard)
-            outcome = flight.command_outcome(inputs, flight.vehicle.flies_setpoints, now_us)
-            if outcome is not None and not outcome.succeeded:
-                text = f"no recovery from a hit in the landing: {outcome.text}"
-                return Transition(Trigger.INTERRUPTED, text, is_left=True)
-            if outcome is not None:
-                flight.expected_mode = offboard
-        return super().step(flight, inputs, now_us)

@@ -283,6 +283,8 @@ def test_the_operator_reads_hit_recovery_and_outcome_and_has_the_detectors_state
 def test_a_vehicle_hit_while_it_hovers_is_pushed():
     f = hovering()
     f.vehicle.push_m_s2 = (0.0, -12.0)
+    # The setpoint goes first, the text with the next step.
+    f.step()
     f.step()
     assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
 
