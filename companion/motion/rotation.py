@@ -39,6 +39,12 @@ def turned(attitude_wxyz: Quaternion, rates_frd_rad_s: Vector3, over_s: float) -
     )
 
 
+def swept_ned(attitude_wxyz: Quaternion, rates_frd_rad_s: Vector3, place_frd: Vector3) -> Vector3:
+    """R(q) (w x r): the velocity of a place of a body that turns."""
+    (p, q, r), (x, y, z) = rates_frd_rad_s, place_frd
+    return body_to_ned(attitude_wxyz, (q * z - r * y, r * x - p * z, p * y - q * x))
+
+
 def tilt_rad(attitude_wxyz: Quaternion) -> float:
     """Angle between body z and down, 0 to pi."""
     return math.acos(max(-1.0, min(1.0, body_to_ned(attitude_wxyz, (0.0, 0.0, 1.0))[2])))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
 from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US
-from companion.motion.rotation import body_to_ned, ned_to_body, turned, yaw_rad
+from companion.motion.rotation import body_to_ned, ned_to_body, swept_ned, turned, yaw_rad
 from companion.motion.vector import ZERO, minus, plus
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -99,8 +99,7 @@ class Strapdown:
     @property
     def turns_ned_m_s(self) -> Vector3:
         """How fast the accelerometer turns about the vehicle's centre."""
-        (p, q, r), (x, y, z) = self.rates_frd_rad_s, self.sensor_frd_m
-        return body_to_ned(self.valid_wxyz, (q * z - r * y, r * x - p * z, p * y - q * x))
+        return swept_ned(self.valid_wxyz, self.rates_frd_rad_s, self.sensor_frd_m)
 
     def velocity(self, sample: LocalPosition | Odometry) -> None:
         time_us, told = sample.time_boot_us, self._odometry

@@ -20,7 +20,7 @@ from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion import config as numbers
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
 from companion.motion.doppler import Doppler, MeasuredVelocity
-from companion.motion.rotation import body_to_ned, turned
+from companion.motion.rotation import body_to_ned, swept_ned, turned
 from companion.motion.settling import Lasting
 from companion.motion.strapdown import LEVEL, Strapdown
 from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
@@ -73,7 +73,9 @@ class MotionEstimator:
     after_error_m_s: float = math.inf  # its standard deviation; infinite until it is known
     _expected_within_m_s: float = field(init=False)  # standard deviation of the expected motion's velocity
     _bank: FilterBank | None = None  # from the first report on
-    _summed_m_s: Vector3 = ZERO  # the accelerometer's integral
+    _summed_m_s: Vector3 = ZERO  # the accelerometer's integral, as at the vehicle's centre
+    _shown_m_s: Vector3 = ZERO  # without what it has turned about that since then
+    _turned_from: tuple[Quaternion, Vector3] | None = None  # attitude and rates, as a contact was shown last
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _time_boot_us: int = field(init=False)  # of the newest sample of the accelerometer
@@ -127,12 +129,17 @@ class MotionEstimator:
             return
         force = body_to_ned(strapdown.valid_wxyz, strapdown.centre_frd_m_s2)
         pushed = plus(force, GRAVITY_M_S2, (0.0, 0.0, 1.0))
-        pushed = ZERO if math.hypot(*pushed) >= GRAVITY_M_S2 else pushed
-        was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
-        self._smoothed_m_s2 = towards(self._smoothed_m_s2, pushed, weight)
-        place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
-        self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed))
-        self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
+        is_free, last = math.hypot(*pushed) < GRAVITY_M_S2, self._summed_m_s
+        weight = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
+        self._smoothed_m_s2 = towards(self._smoothed_m_s2, pushed if is_free else ZERO, weight)
+        if not is_free or self._turned_from is None:
+            self._turned_from, self._shown_m_s = (strapdown.valid_wxyz, strapdown.rates_frd_rad_s), last
+        if is_free:
+            self._shown_m_s = plus(self._shown_m_s, elapsed_s, strapdown.acceleration_ned_m_s2)
+            # The accelerometer's place, as it is known by now, counts for all of the turn.
+            began_m_s = swept_ned(*self._turned_from, strapdown.sensor_frd_m)
+            self._summed_m_s = plus(self._shown_m_s, -1.0, minus(strapdown.turns_ned_m_s, began_m_s))
+        self._carry_on(elapsed_s, minus(self._summed_m_s, last))
         since_s = 1e-6 * (time_us - self.pushed_boot_us)
         if since_s > reflex.SMOOTHED_S:
             # Drag changes with the speed, until it rests; then wind is left.
@@ -140,6 +147,11 @@ class MotionEstimator:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             share = elapsed_s / (memory_s + elapsed_s)
             self.external_m_s2 = towards(self.external_m_s2, flat(split(force, down)[1]), share)
+
+    def _carry_on(self, elapsed_s: float, faster_m_s: Vector3) -> None:
+        place, velocity = self.motion.position_ned_m, self.motion.velocity_ned_m_s
+        place = plus(place, elapsed_s, plus(velocity, 0.5, faster_m_s))
+        self.motion = MotionState(place, plus(velocity, 1.0, faster_m_s))
 
     @property
     def _bias_m_s2(self) -> Vector3:

@@ -61,7 +61,6 @@ class Lever:
     error_m_s2: float = 0.0  # standard deviation of its sideways part, by that of the height
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     spins_per_s2: float = 0.0  # square of the rates
-    has_turned: bool = False  # so lately that the mean of the force still shows it
     _before_rad_s: Vector3 = ZERO  # rates of the sample before the newest
     _rates_rad_s: Vector3 = ZERO
     _turns_rad_s2: Vector3 = ZERO  # as between these; no more than motors make
@@ -69,6 +68,7 @@ class Lever:
     _samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = field(default_factory=list)
     """H, and what is shown of f_x and f_y, of those to be learnt from; they are, every RATE_MEMORY_US."""
     _since_s: float = 0.0
+    _yawed_rad: float = 0.0  # in these
     _mean: Floats = field(default_factory=lambda: np.zeros((2, 4)))  # of H, and of what is shown of f_x and f_y
     _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     _against: Floats = field(default_factory=lambda: np.zeros(3))
@@ -105,28 +105,29 @@ class Lever:
             f[2],
         )
 
-    def learn(self, mean_frd_m_s2: Vector3, variance: float, elapsed_s: float, turns: bool) -> None:
-        """Take the newest sample of a free vehicle, whose force at that point had a mean of MEAN_MEMORY_S.
+    def learn(self, variance: float, elapsed_s: float) -> None:
+        """Take the newest sample of a free vehicle that turns beyond the gyroscopes' noise.
 
-        `variance`: about it, without a turn; `turns`: it is one beyond the gyroscopes' noise.
+        `variance`: of its force, without a turn.
         """
         (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
         rows = (-q * q - r * r, p * q - k, p * r + j, x), (p * q + k, -p * p - r * r, q * r - i, y)
         self._samples.append(rows)
         self._since_s += elapsed_s
+        self._yawed_rad += elapsed_s * r
         if 1e6 * self._since_s < reflex.RATE_MEMORY_US:
             return
         # Their mean: the gyroscopes' noise in H would make the place nearer.
         count, shown = len(self._samples), np.mean(self._samples, axis=0)
+        c, s = math.cos(self._yawed_rad), math.sin(self._yawed_rad)
         share, self._samples, self._since_s = min(self._since_s / reflex.MEAN_MEMORY_S, 1.0), [], 0.0
-        if not self.has_turned:
-            self._mean = np.array([[0.0, 0.0, 0.0, each] for each in mean_frd_m_s2[:2]])
-        # As the force's mean follows a turn, so does that of H.
+        # As the force's mean follows a turn, so does that of H. Wind and drag turn the other way, seen by the vehicle.
+        self._mean, self._yawed_rad = [[c, s], [-s, c]] @ self._mean, 0.0
         self._mean += share * (shown - self._mean)
-        self.has_turned = turns or bool(np.abs(self._mean[:, :3]).max() > reflex.TURNS_PER_S2)
         h, force = np.hsplit(shown - self._mean, [3])
-        self._square += count * h.T @ h
-        self._against += count * h.T @ force[:, 0]
+        # What a mean has not followed lasts as long as its memory: of its samples few are independent.
+        self._square += share * count * h.T @ h
+        self._against += share * count * h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)

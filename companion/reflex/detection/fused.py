@@ -239,10 +239,8 @@ class FusedDetector:
         s.vertical_threshold_m_s2 = max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
-            is_turning = s.turn.turns_rad_s2 > reflex.TURNS_PER_S2 or lever.spins_per_s2 > reflex.TURNS_PER_S2
-            if is_turning or lever.has_turned:
-                spread_m_s2 = s.threshold_m_s2 / config.noise_factor
-                lever.learn(s.floor.mean_frd_m_s2, spread_m_s2**2, elapsed_s, is_turning)
+            if s.turn.turns_rad_s2 > reflex.TURNS_PER_S2 or lever.spins_per_s2 > reflex.TURNS_PER_S2:
+                lever.learn((s.threshold_m_s2 / config.noise_factor) ** 2, elapsed_s)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2

@@ -279,7 +279,7 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     rad_s2, is_known
 ):
     flight = Flight(rates=rolling(rad_s2)[1], heard=(Attitude, AttitudeTarget))
-    assert flight.fly(3_500_000) == []
+    assert flight.fly(7_500_000) == []
     flight.state.threshold_m_s2 = 1.75
     for rate_rad_s in (0.0, 0.0, 0.24, 0.48):
         flight.motion.lever.imu(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
@@ -294,7 +294,10 @@ def test_a_spin_about_the_thrust_shows_where_the_sensor_is_though_drag_changes_w
 
     def push(t_us):
         turns_rad_s2 = 1e3 * (yaw_rad_s(t_us) - yaw_rad_s(t_us - 1_000))
-        return (1.0 * (t_us > 1_500_000) - 0.06 * yaw_rad_s(t_us) ** 2, 0.06 * turns_rad_s2, 0.0)
+        since_s = 1e-6 * max(t_us - 1_500_000, 0)
+        drag, yaw_rad = since_s > 0.0, 12.0 / math.pi * (1.0 - math.cos(0.5 * math.pi * since_s))
+        ahead, right = drag * math.cos(yaw_rad), -drag * math.sin(yaw_rad)
+        return (ahead - 0.06 * yaw_rad_s(t_us) ** 2, right + 0.06 * turns_rad_s2, 0.0)
 
     flight = Flight(push, rates=lambda t_us: (0.0, 0.0, yaw_rad_s(t_us)), heard=(Attitude, AttitudeTarget))
     # When it flies on, then that is learnt of it, and nothing was a hit

@@ -57,9 +57,8 @@ class Turning:
             x, y, _ = lever.force_frd_m_s2
             turned_m_s2 = config.noise_factor * lever.error_m_s2
             yield math.hypot(x, y), math.hypot(config.side_threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
-            turns = turn.turns_rad_s2 > TURNS_PER_S2 or lever.spins_per_s2 > TURNS_PER_S2
-            if turns or lever.has_turned:
-                lever.learn(ZERO, 0.25, 1e-6 * self.every_us, turns)
+            if turn.turns_rad_s2 > TURNS_PER_S2 or lever.spins_per_s2 > TURNS_PER_S2:
+                lever.learn(0.25, 1e-6 * self.every_us)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +137,7 @@ def test_a_spin_that_a_hit_leaves_shows_all_of_the_place() -> None:
         turns = -rates / (0.1, 0.3, 0.2)
         force, rates = spinning(rates, turns), rates + 0.004 * turns
         lever.imu(WINDOW_US, tuple(force.tolist()), tuple(rates.tolist()), WINDOW_US)
-        lever.learn(ZERO, 0.2, 0.004, lever.spins_per_s2 > TURNS_PER_S2)
+        lever.learn(0.2, 0.004)
     assert lever.place_frd_m == pytest.approx(PLACE_M, abs=0.01)
     assert max(lever.errors_m) < 0.02
     assert lever.force_frd_m_s2[:2] == pytest.approx((0.0, 0.0), abs=0.5)
@@ -148,32 +147,46 @@ def test_a_spin_that_goes_on_as_fast_teaches_no_more_as_that_may_be_drag() -> No
     lever, rates = Lever(), np.array([0.0, 0.0, 5.0])
     for _ in range(1000):
         lever.imu(WINDOW_US, tuple(spinning(rates, ZERO).tolist()), tuple(rates.tolist()), WINDOW_US)
-        lever.learn(ZERO, 0.2, 0.004, lever.spins_per_s2 > TURNS_PER_S2)
+        lever.learn(0.2, 0.004)
     assert lever.errors_m[0] > 0.002
 
 
-def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belief_nor_a_receivers_velocity() -> None:
-    # Given a vehicle at rest in the air whose sensor's place is known
+def spun_up(known_from_tick):
+    """A vehicle at rest in the air that spins up about its thrust within 0.1 s, and on for 0.22 s; and the belief.
+
+    The sensor's place is known from that sample on.
+    """
     source, now_us = ImpactEstimator(EstimateConfig()), 1_000_000
-    source.lever.place_frd_m = PLACE_M
     source.strapdown.time_boot_us = now_us
     source.update(LocalPosition(now_us, ZERO, ZERO))
     contact = Contact(ZERO, ZERO, (-1.0, 0.0, 0.0))
     source.followed = [found := MotionEstimator(contact, now_us, contact.rebound(0.0), EstimateConfig())]
-    # When it spins up about its thrust within 20 ms, and on for 0.3 s
     rates: Any = np.zeros(3)
     for tick in range(80):
+        source.lever.place_frd_m = PLACE_M if tick >= known_from_tick else ZERO
         turns = np.array([0.0, 0.0, 80.0 if tick < 25 else 0.0])
         rates, now_us = rates + 0.004 * turns, now_us + 4_000
         force = spinning(rates - 0.002 * turns, turns)
         source.update(ImuSample(now_us, tuple(force.tolist()), tuple(rates.tolist())))
         if tick == 15:
             source.update(LocalPosition(now_us, ZERO, ZERO))
-    # Then the sensor moves, the vehicle does not
+    return source, found
+
+
+def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belief_nor_a_receivers_velocity() -> None:
+    source, found = spun_up(known_from_tick=0)
+    # The sensor moves, the vehicle does not.
     assert math.hypot(*source.strapdown.sum_ned_m_s) > 0.3
     assert math.hypot(*found.motion.velocity_ned_m_s) < 0.05 and math.hypot(*found.external_m_s2) < 0.3
     source.update(GpsFix((0.0, 0.0), 47.0, 8.0, 0.0))
     assert math.hypot(*source.doppler.velocity_ned_m_s) < 0.05
+
+
+@pytest.mark.parametrize(("known_from_tick", "most_m_s"), [(60, 0.2), (80, math.inf)])
+def test_a_place_that_is_known_late_counts_for_all_of_the_turn(known_from_tick, most_m_s) -> None:
+    _, found = spun_up(known_from_tick)
+    moves_m_s = math.hypot(*found.motion.velocity_ned_m_s)
+    assert moves_m_s < most_m_s and (moves_m_s > 0.3) is (known_from_tick == 80)
 
 
 @pytest.mark.parametrize("is_told", [False, True])

@@ -139,7 +139,7 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     def go_on(seconds, acceleration):
         for _ in range(round(seconds / 0.004)):
             strapdown.time_boot_us = (strapdown.time_boot_us or HIT_US) + 4_000
-            strapdown.centre_frd_m_s2 = minus(acceleration, (0.0, 0.0, GRAVITY_M_S2))
+            strapdown.imu(strapdown.time_boot_us, minus(acceleration, (0.0, 0.0, GRAVITY_M_S2)), ZERO)
             found.imu(strapdown)
 
     go_on(0.02, (-9.0, 0.0, 0.0))
