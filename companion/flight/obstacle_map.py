@@ -1,6 +1,7 @@
 """The flight's part of the obstacle map: what its hits add, for trajectories and for recoveries."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface
@@ -71,7 +72,8 @@ def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
     """Surfaces that a setpoint must not lead into: those hit in this recovery, and the obstacle map."""
     known = []
     for record in flight.reflex.in_one_recovery():
-        surface = Surface(record.contact.position_ned_m, record.contact.normal_ned, LEAST_FREE_M)
+        # As it is known now: the first sample's normal may be 35 degrees wrong.
+        surface = replace(record.surfaces[0], distance_m=LEAST_FREE_M)
         # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:
             known.append(KnownSurface(surface))
