@@ -105,7 +105,7 @@ class MotionEstimator:
         moved_m_s = impulse_m_s if impulse_m_s > 2.0 * came_m_s else 0.0
         self.spread_m_s = self._expected_within_m_s = SAME_M_S + reflex.SPREAD * came_m_s + moved_m_s
         self.position_error_m = self.velocity_error_m_s = ZERO
-        self._swings_m_s = 0.0
+        self._swings_m_s, self.after_error_m_s = 0.0, math.inf
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int, normal: Normal, impulse_m_s: float) -> None:
         """Take what is known of the contact by now: whether it was measured whole, its last sample's time, its normal

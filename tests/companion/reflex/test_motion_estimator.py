@@ -156,9 +156,14 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
     go_on(0.1, (1.0, 3.0, 0.0))
     found.update(LocalPosition(strapdown.time_boot_us, AT, (5.0, 5.0, 0.0)))
     assert found.after_ned_m_s == pytest.approx((-1.0, -2.0, 0.0), abs=0.05)
-    # until it is pushed again
-    found.note_contact(True, strapdown.time_boot_us, found.normal, 0.0)
-    assert found.after_error_m_s == math.inf
+    # until it is pushed again, or a part of the contact turns out to be hidden
+    pushed_us = strapdown.time_boot_us
+    for is_fully_measured in (True, False):
+        found.note_contact(is_fully_measured, pushed_us, found.normal, 0.0)
+        assert found.after_error_m_s == math.inf
+        go_on(0.04, ZERO)
+        found.update(LocalPosition(strapdown.time_boot_us, AT, velocity))
+        assert found.after_error_m_s < math.inf
 
 
 def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
