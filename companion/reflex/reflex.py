@@ -24,7 +24,6 @@ from companion.reflex.detection.sustained_force import SustainedForceMonitor
 from companion.reflex.recovery.attitude_law import Lean, wanted
 from companion.reflex.recovery.collision import Collision, Room
 from companion.reflex.recovery.laws import RECOVERY_LAWS, Law
-from companion.reflex.surface import Surface
 
 
 class Reaction(NamedTuple):
@@ -142,8 +141,7 @@ class Reflex:
         estimator = estimate.after or source.motion_after(estimate)
         source.followed, estimator.is_answered = [*source.answered[-1:], estimator], True
         estimator.note_wind(self.sustained_force.hover_wind_m_s2)
-        clearance_m = self.law_config.clearance_m
-        surfaces = [Surface(each.contact.position_ned_m, each.normal.direction_ned, clearance_m) for each in earlier]
+        surfaces = [each.surfaces[0] for each in earlier]
         shown = self.config.detector, impact.size_m_s2, source, estimator
         how = self.law, self.law_config, self.settled
         self.newest = Collision(now_us, *shown, *how, room, surfaces, self.keeps_trim)
