@@ -185,7 +185,7 @@ class FusedDetector:
                 s.phase = Phase.ARMED
             return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
-        force = minus(f, s.free_frd_m_s2)
+        force = minus(s.force[1], s.free_frd_m_s2)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s
         is_learnt = math.dist(f, s.floor.mean_frd_m_s2) < s.threshold_m_s2
         if s.phase in (Phase.OFF, Phase.QUIET) or is_shaking:

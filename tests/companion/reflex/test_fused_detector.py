@@ -313,6 +313,10 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     together = Flight(pulse((0.0, 8.5, 0.0), 3_000_500, 8_000), noise=1.5)
     assert [i.contact_free_until_boot_us for i in together.fly()] == [3_000_000]
     assert together.state.peak_specific_force_m_s2 < together.state.threshold_m_s2
+    pushes = {750: (0.0, 10.0, 0.0), 751: (9.5, 0.0, 0.0)}
+    (turning,) = Flight(lambda t: pushes.get((t - 500) // 4_000, ZERO), noise=1.5).fly()
+    ahead, right, _ = turning.specific_force_frd_m_s2  # of both
+    assert 0.5 < ahead / right < 2.0
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5).fly()
     assert [i.sample_time_boot_us for i in strong] == [3_004_000]
     (with_jump,) = Flight(once.push, noise=1.5).fly()
