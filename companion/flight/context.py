@@ -27,6 +27,8 @@ from companion.reflex.recovery.collision import Collision
 from companion.reflex.reflex import Reflex
 from companion.report import Event, ExpectationReport, JsonValue, Outcome
 
+# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
+LEAD_US = 40_000
 # As the autopilot's own modes turn: the vehicle can follow.
 TURNING_RAD_S = math.radians(defaults.TURNING_DEG_S)
 

@@ -1,14 +1,11 @@
 """State recovering: asks the reflex for the way to rest, and tells how it goes."""
 
 from companion.flight.after_hit import take_back
-from companion.flight.context import FlightContext, FlightT, Handler, Inputs, Target, Transition, as_text
+from companion.flight.context import LEAD_US, FlightContext, FlightT, Handler, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import FlightRoom
 from companion.flight.states import Trigger
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.recovery.collision import Progress
-
-# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
-LEAD_US = 40_000
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -125,9 +125,8 @@ class Lever:
         self._mean, self._yawed_rad = [[c, s], [-s, c]] @ self._mean, 0.0
         self._mean += share * (shown - self._mean)
         h, force = np.hsplit(shown - self._mean, [3])
-        # What a mean has not followed lasts as long as its memory: of its samples few are independent.
-        self._square += share * count * h.T @ h
-        self._against += share * count * h.T @ force[:, 0]
+        self._square += count * h.T @ h
+        self._against += count * h.T @ force[:, 0]
         known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)

@@ -279,7 +279,7 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     rad_s2, is_known
 ):
     flight = Flight(rates=rolling(rad_s2)[1], heard=(Attitude, AttitudeTarget))
-    assert flight.fly(7_500_000) == []
+    assert flight.fly(3_500_000) == []
     flight.state.threshold_m_s2 = 1.75
     for rate_rad_s in (0.0, 0.0, 0.24, 0.48):
         flight.motion.lever.imu(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)

@@ -143,12 +143,14 @@ def test_a_spin_that_a_hit_leaves_shows_all_of_the_place() -> None:
     assert lever.force_frd_m_s2[:2] == pytest.approx((0.0, 0.0), abs=0.5)
 
 
-def test_a_spin_that_goes_on_as_fast_teaches_no_more_as_that_may_be_drag() -> None:
+def test_a_spin_that_goes_on_as_fast_shows_the_place_too_as_drag_turns_against_it() -> None:
     lever, rates = Lever(), np.array([0.0, 0.0, 5.0])
-    for _ in range(1000):
-        lever.imu(WINDOW_US, tuple(spinning(rates, ZERO).tolist()), tuple(rates.tolist()), WINDOW_US)
+    for tick in range(1000):
+        yaw_rad = 0.004 * 5.0 * tick
+        force = spinning(rates, ZERO) + (math.cos(yaw_rad), -math.sin(yaw_rad), 0.0)
+        lever.imu(WINDOW_US, tuple(force.tolist()), tuple(rates.tolist()), WINDOW_US)
         lever.learn(0.2, 0.004)
-    assert lever.errors_m[0] > 0.002
+    assert lever.place_frd_m[:2] == pytest.approx(PLACE_M[:2], abs=0.01)
 
 
 def spun_up(known_from_tick):
