@@ -147,7 +147,7 @@ def test_a_spin_that_goes_on_as_fast_shows_the_place_too_as_drag_turns_against_i
     lever, rates = Lever(), np.array([0.0, 0.0, 5.0])
     for tick in range(1000):
         yaw_rad = 0.004 * 5.0 * tick
-        force = spinning(rates, ZERO) + (math.cos(yaw_rad), -math.sin(yaw_rad), 0.0)
+        force = spinning(rates, ZERO) + np.array([math.cos(yaw_rad), -math.sin(yaw_rad), 0.0])
         lever.imu(WINDOW_US, tuple(force.tolist()), tuple(rates.tolist()), WINDOW_US)
         lever.learn(0.2, 0.004)
     assert lever.place_frd_m[:2] == pytest.approx(PLACE_M[:2], abs=0.01)
