@@ -120,8 +120,9 @@ class Lever:
         # Their mean: the gyroscopes' noise in H would make the place nearer.
         count, shown = len(self._samples), np.mean(self._samples, axis=0)
         c, s = math.cos(self._yawed_rad), math.sin(self._yawed_rad)
-        share, self._samples, self._since_s = min(self._since_s / reflex.MEAN_MEMORY_S, 1.0), [], 0.0
-        # As the force's mean follows a turn, so does that of H. Wind and drag turn the other way, seen by the vehicle.
+        share, self._samples, self._since_s = min(self._since_s / reflex.LEAD_S, 1.0), [], 0.0
+        # Less what lasts beside a turn: drag and gusts change no faster than the attitude. Seen by the vehicle they turn
+        # against its yaw.
         self._mean, self._yawed_rad = [[c, s], [-s, c]] @ self._mean, 0.0
         self._mean += share * (shown - self._mean)
         h, force = np.hsplit(shown - self._mean, [3])
