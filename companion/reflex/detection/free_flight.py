@@ -121,8 +121,7 @@ class Lever:
         count, shown = len(self._samples), np.mean(self._samples, axis=0)
         c, s = math.cos(self._yawed_rad), math.sin(self._yawed_rad)
         share, self._samples, self._since_s = min(self._since_s / reflex.LEAD_S, 1.0), [], 0.0
-        # Less what lasts beside a turn: drag and gusts change no faster than the attitude. Seen by the vehicle they turn
-        # against its yaw.
+        # Less what lasts beside a turn: drag and gusts change no faster than the attitude, and turn against the yaw.
         self._mean, self._yawed_rad = [[c, s], [-s, c]] @ self._mean, 0.0
         self._mean += share * (shown - self._mean)
         h, force = np.hsplit(shown - self._mean, [3])
