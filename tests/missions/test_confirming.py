@@ -68,7 +68,7 @@ def assert_goes_on(air: Flight, unconfirmed: int) -> None:
     assert air.told("expect") == []
 
 
-@pytest.mark.parametrize("force_m_s2", [-100.0, -10.0, -6.0, 40.0])
+@pytest.mark.parametrize("force_m_s2", [-100.0, -10.0, -8.0, 40.0])
 def test_one_forged_packet_costs_a_twitch(force_m_s2):
     def forge(air: Flight) -> None:
         before_us = air.now_us

@@ -108,7 +108,7 @@ class Lever:
     def learn(self, variance: float, elapsed_s: float) -> None:
         """Take the newest sample of a free vehicle that turns beyond the gyroscopes' noise.
 
-        `variance`: of its force, without a turn.
+        `variance`: of its force besides.
         """
         (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
         rows = (-q * q - r * r, p * q - k, p * r + j, x), (p * q + k, -p * p - r * r, q * r - i, y)
@@ -125,12 +125,12 @@ class Lever:
         self._mean, self._yawed_rad = [[c, s], [-s, c]] @ self._mean, 0.0
         self._mean += share * (shown - self._mean)
         h, force = np.hsplit(shown - self._mean, [3])
-        self._square += count * h.T @ h
-        self._against += count * h.T @ force[:, 0]
-        known = np.linalg.inv(self._square + variance / reflex.LEVER_M**2 * np.eye(3))
+        self._square += count / variance * h.T @ h
+        self._against += count / variance * h.T @ force[:, 0]
+        known = np.linalg.inv(self._square + reflex.LEVER_M**-2 * np.eye(3))
         x, y, z = (known @ self._against).tolist()
         self.place_frd_m = (x, y, z)
-        x, y, z = np.sqrt(variance * known.diagonal()).tolist()
+        x, y, z = np.sqrt(known.diagonal()).tolist()
         self.errors_m = (x, y, z)
 
 

@@ -240,7 +240,8 @@ class FusedDetector:
         if s.phase in (Phase.QUIET, Phase.ARMED):
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
             if s.turn.turns_rad_s2 > reflex.TURNS_PER_S2 or lever.spins_per_s2 > reflex.TURNS_PER_S2:
-                lever.learn((s.threshold_m_s2 / config.noise_factor) ** 2, elapsed_s)
+                # A contact may push by less than the limit, too.
+                lever.learn((s.side.limit / config.noise_factor) ** 2, elapsed_s)
 
     def _loud(self, s: FusedState, situation: Situation, motion: Motion, impact: Impact, f: Vector3) -> Impact | None:
         now_us, size = impact.sample_time_boot_us, impact.size_m_s2
