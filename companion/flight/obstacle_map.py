@@ -72,7 +72,7 @@ def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
     """Surfaces that a setpoint must not lead into: those hit in this recovery, and the obstacle map."""
     known = []
     for record in flight.reflex.in_one_recovery():
-        # As it is known now: the first sample's normal may be 35 degrees wrong.
+        # As it is known now: the first sample's normal was 51 degrees wrong on a real PX4.
         surface = replace(record.surfaces[0], distance_m=LEAST_FREE_M)
         # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:

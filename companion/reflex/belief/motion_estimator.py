@@ -74,8 +74,8 @@ class MotionEstimator:
     _expected_within_m_s: float = field(init=False)  # standard deviation of the expected motion's velocity
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral, as at the vehicle's centre
-    _shown_m_s: Vector3 = ZERO  # without what it has turned about that since then
-    _turned_from: tuple[Quaternion, Vector3] | None = None  # attitude and rates, as a contact was shown last
+    _turned_from: tuple[Quaternion, Vector3] | None = None  # attitude and rates at the last sample of more than 1 g
+    _shown_m_s: Vector3 = ZERO  # the integral up to that sample, and from there on as at the accelerometer
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _time_boot_us: int = field(init=False)  # of the newest sample of the accelerometer
@@ -136,7 +136,7 @@ class MotionEstimator:
             self._turned_from, self._shown_m_s = (strapdown.valid_wxyz, strapdown.rates_frd_rad_s), last
         if is_free:
             self._shown_m_s = plus(self._shown_m_s, elapsed_s, strapdown.acceleration_ned_m_s2)
-            # The accelerometer's place, as it is known by now, counts for all of the turn.
+            # The newest place of the accelerometer counts for all of the turn.
             began_m_s = swept_ned(*self._turned_from, strapdown.sensor_frd_m)
             self._summed_m_s = plus(self._shown_m_s, -1.0, minus(strapdown.turns_ned_m_s, began_m_s))
         self._carry_on(elapsed_s, minus(self._summed_m_s, last))

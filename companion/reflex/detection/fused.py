@@ -167,10 +167,12 @@ class FusedDetector:
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
         s.side.value, s.side.limit, is_of_two = s.side_force(config, motion.lever)
+        s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
+        sideways, upright = s.side.value / s.side.limit, s.vertical.value / s.vertical.limit
+        is_of_two = is_of_two and sideways >= upright
         if is_of_two:
             free_until_us = earlier_us
-        s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
-        ratio = max(s.side.value / s.side.limit, s.vertical.value / s.vertical.limit)
+        ratio = max(sideways, upright)
         s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off

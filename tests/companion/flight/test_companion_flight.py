@@ -285,6 +285,7 @@ def test_a_vehicle_hit_while_it_hovers_is_pushed():
     f.vehicle.push_m_s2 = (0.0, -12.0)
     # The setpoint goes first, the text with the next step.
     f.step()
+    assert f.state == "recovering" and "Hit" not in f.messages("STATUSTEXT")[-1][1].text
     f.step()
     assert f.messages("STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
 

@@ -190,10 +190,14 @@ def test_a_second_hit_of_a_vehicle_whose_velocity_is_not_known_turns_no_normal_b
     # Given a clipped hit, whose velocity is known to 0.7 m/s, and another one at once
     contact = Contact(AT, (2.0, 0.0, 0.0), SOUTH, 0.2)
     flight = flight_with(estimator=MotionEstimator(contact, HIT_US, contact.rebound(0.45), EstimateConfig()))
+    first = flight.collisions[0]
+    first.surfaces = [replace(first.surfaces[0], normal_ned=(-0.8, 0.6, 0.0))]
     impact = Impact(HIT_US + 100_000, HIT_US + 96_000, (-20.0, 0.0, 0.0))
     estimate = flight.reflex.monitor.estimator.begin(impact)
     record = flight.reflex.begin(estimate, FlightRoom(flight), 100_000)
-    # Then its velocity is the belief's, as uncertain as that
+    # Then what was hit before is where it is known to be
+    assert first.surfaces[0] in record.surfaces
+    # and its velocity is the belief's, as uncertain as that
     assert record.contact.velocity_ned_m_s == pytest.approx((-0.9, 0.0, 0.0))
     assert record.contact.velocity_error_m_s == pytest.approx(SAME_M_S + 0.3 * 2.0)
 

@@ -11,7 +11,7 @@ import pytest
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Odometry
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, plus
-from companion.reflex.config import EXCESS, EstimateConfig, FusedConfig
+from companion.reflex.config import EXCESS, LEVER_M, EstimateConfig, FusedConfig
 from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Situation
 from companion.reflex.detection.free_flight import ForceNoise
 from companion.reflex.detection.fused import FusedDetector, FusedState
@@ -305,6 +305,15 @@ def test_a_spin_about_the_thrust_shows_where_the_sensor_is_though_drag_changes_w
     assert flight.motion.lever.place_frd_m == pytest.approx((0.06, 0.0, 0.0), abs=0.01)
 
 
+def test_one_sample_of_a_fast_spin_may_be_a_contacts_and_teaches_little():
+    def spin(t_us):
+        return (0.0, 0.0, 10.0 * (t_us > 3_000_000))
+
+    flight = Flight(imu_every_us=20_000, rates=spin, heard=(Attitude, AttitudeTarget))
+    flight.fly(3_050_000)
+    assert 0.015 < flight.motion.lever.errors_m[0] < LEVER_M
+
+
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
     once = Flight(pulse((0.0, 10.5, 0.0), 3_000_500, 4_000), noise=1.5, heard=(Attitude, AttitudeTarget))
     assert once.fly() == [] and once.state.threshold_m_s2 > 8.0
@@ -317,6 +326,9 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     (turning,) = Flight(lambda t: pushes.get((t - 500) // 4_000, ZERO), noise=1.5).fly()
     ahead, right, _ = turning.specific_force_frd_m_s2  # of both
     assert 0.5 < ahead / right < 2.0
+    pushes = {750: (0.0, 6.0, 0.0), 751: (0.0, 6.0, 80.0)}
+    (from_above,) = Flight(lambda t: pushes.get((t - 500) // 4_000, ZERO), noise=1.5).fly()
+    assert from_above.specific_force_frd_m_s2[2] > 70.0  # one sample's alone
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5).fly()
     assert [i.sample_time_boot_us for i in strong] == [3_004_000]
     (with_jump,) = Flight(once.push, noise=1.5).fly()
