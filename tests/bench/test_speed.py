@@ -12,7 +12,7 @@ HELD_RATIO = {
     "a quiet IMU sample": 2.97,
     "a position": 3.85,
     "an attitude": 2.09,
-    "a hit's first sample": 21.8,
+    "a hit's first sample": 20.4,
     "a second of flight": 2.14,
 }
 
