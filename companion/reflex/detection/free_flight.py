@@ -108,15 +108,21 @@ class Lever:
     def learn(self, variance: float, elapsed_s: float) -> None:
         """Take the newest sample of a free vehicle that turns beyond the gyroscopes' noise.
 
-        `variance`: of its force besides.
+        `variance`: of its force besides. It teaches with a later one: what comes just before a hit may be of it.
         """
+        if 1e6 * self._since_s >= reflex.RATE_MEMORY_US:
+            self._teach(variance)
         (p, q, r), (i, j, k), (x, y, _) = self._before_rad_s, self._turns_rad_s2, self._shown_m_s2
         rows = (-q * q - r * r, p * q - k, p * r + j, x), (p * q + k, -p * p - r * r, q * r - i, y)
         self._samples.append(rows)
         self._since_s += elapsed_s
         self._yawed_rad += elapsed_s * r
-        if 1e6 * self._since_s < reflex.RATE_MEMORY_US:
-            return
+
+    def forget(self) -> None:
+        """What has not taught yet never does."""
+        self._samples, self._since_s = [], 0.0
+
+    def _teach(self, variance: float) -> None:
         # Their mean: the gyroscopes' noise in H would make the place nearer.
         count, shown = len(self._samples), np.mean(self._samples, axis=0)
         c, s = math.cos(self._yawed_rad), math.sin(self._yawed_rad)

@@ -186,6 +186,7 @@ class FusedDetector:
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
             return self._turned(s, earlier_us, situation, motion) if s.turn.value > s.turn.limit else None
+        motion.lever.forget()
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         force = minus(s.force[1], s.free_frd_m_s2)
         is_shaking = s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s

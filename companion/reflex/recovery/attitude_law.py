@@ -5,7 +5,8 @@ the tilt of TILT_AHEAD_S later, horizontally
 
     a = k (v_o - v) - (b + e) - e,        k = BRAKING_PER_S
 
-v_o is the slowest velocity that leads off each surface by RETURN_PER_S times what is missing of its clearance.
+v_o is the slowest velocity that leads off each surface by RETURN_PER_S times what will be missing of its clearance
+when the thrust has turned, LEAD_S later.
 Vertically a_d = HEIGHT_PER_S2 (d_0 - d) - CLIMB_PER_S v_d. What PX4 makes of it, held until it notices that nothing
 follows, stays off every half-space (`held_off`). The thrust's axis is along a - g; its size carries the vehicle at the
 present tilt.
@@ -53,8 +54,11 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     """The acceleration, besides that by wind and drag, that brings the vehicle to rest clear of the surfaces."""
     place, velocity, external = belief.position_ned_m, belief.velocity_ned_m_s, belief.external_m_s2
     v_d = velocity[2]
-    sides = [(one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - one.off_m(place))) for one in surfaces]
-    near = [(normal, off_m_s) for normal, off_m_s in sides if off_m_s > 0.0]
+    near = []
+    for one in surfaces:
+        off_m = one.off_m(place) + reflex.LEAD_S * _certain_m_s(belief, one.normal_ned)
+        if off_m < one.distance_m:
+            near.append((one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - off_m)))
     for normal, off_m_s in near:
         velocity = _certain(velocity, normal, belief.spread_m_s, off_m_s)
     off = projected(ZERO, near)
@@ -68,9 +72,7 @@ def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[
     """The acceleration whose speed towards each surface, after `held_s`, can still be braked in front of it."""
     sides = []
     for surface in surfaces:
-        # Of a speed away from it what is certain.
-        speed_m_s = along(belief.velocity_ned_m_s, surface.normal_ned)
-        speed_m_s -= min(max(speed_m_s, 0.0), belief.spread_m_s)
+        speed_m_s = _certain_m_s(belief, surface.normal_ned)
         # The present speed's half of the way until then; the other half is that of the speed then.
         room_m = surface.off_m(belief.position_ned_m) - surface.distance_m + 0.5 * speed_m_s * held_s
         by_wind = along(belief.external_m_s2, surface.normal_ned)
@@ -81,6 +83,12 @@ def held_off(acceleration_ned_m_s2: Vector3, belief: Belief, surfaces: Sequence[
 def braked(belief: Belief, normal_ned: Vector3, within_s: float) -> Vector3:
     """The level acceleration that ends the speed within a time."""
     return plus(ZERO, -1.0 / within_s, _certain(flat(belief.velocity_ned_m_s), normal_ned, belief.spread_m_s))
+
+
+def _certain_m_s(belief: Belief, normal: Vector3) -> float:
+    """The speed along a normal; away from the surface, what is certain of it."""
+    speed_m_s = along(belief.velocity_ned_m_s, normal)
+    return speed_m_s - min(max(speed_m_s, 0.0), belief.spread_m_s)
 
 
 def _certain(velocity_m_s: Vector3, normal: Vector3, spread_m_s: float, off_m_s: float = 0.0) -> Vector3:
