@@ -56,7 +56,9 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     v_d = velocity[2]
     near = []
     for one in surfaces:
-        off_m = one.off_m(place) + reflex.LEAD_S * _certain_m_s(belief, one.normal_ned)
+        off_m = one.off_m(place)
+        # What pushes the vehicle goes along with it, and is not left.
+        off_m += min(reflex.LEAD_S * _certain_m_s(belief, one.normal_ned), max(off_m, 0.0))
         if off_m < one.distance_m:
             near.append((one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - off_m)))
     for normal, off_m_s in near:

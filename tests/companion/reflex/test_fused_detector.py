@@ -310,8 +310,22 @@ def test_one_sample_of_a_fast_spin_may_be_a_contacts_and_teaches_little():
         return (0.0, 0.0, 10.0 * (t_us > 3_000_000))
 
     flight = Flight(imu_every_us=20_000, rates=spin, heard=(Attitude, AttitudeTarget))
-    flight.fly(3_050_000)
+    flight.fly(3_070_000)
     assert 0.015 < flight.motion.lever.errors_m[0] < LEVER_M
+
+
+def test_what_comes_just_before_a_hit_teaches_nothing_of_the_sensors_place():
+    # Given a spin within which a contact begins with less than its limit
+    def spin(t_us):
+        return (0.0, 0.0, 10.0 * (t_us > 3_000_000))
+
+    def contact(t_us):
+        return (-6.0 if 3_045_000 < t_us < 3_065_000 else -40.0 if 3_065_000 <= t_us < 3_085_000 else 0.0, 0.0, 0.0)
+
+    flight = Flight(contact, imu_every_us=20_000, rates=spin, noise=0.0, heard=(Attitude, AttitudeTarget))
+    (impact,) = flight.fly(3_300_000)
+    assert impact.sample_time_boot_us == 3_080_000
+    assert flight.motion.lever.place_frd_m == pytest.approx(ZERO, abs=0.001)
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():

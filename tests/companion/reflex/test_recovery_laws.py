@@ -163,6 +163,16 @@ def test_a_vehicle_that_leaves_a_wall_is_at_rest_within_a_second_and_clear(speed
     assert min(WALL.off_m(place) for place, _ in path) > -0.02, "never back into the wall"
 
 
+def test_what_has_left_a_wall_is_led_off_it_by_where_it_will_be_when_its_thrust_has_turned():
+    def asked_m_s2(off_m, speed_m_s):
+        return wanted(Belief(plus(HERE, off_m, SOUTH), plus(ZERO, speed_m_s, SOUTH)), [WALL], HERE[2])[0]
+
+    assert asked_m_s2(0.1, 0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 - 0.15 * 0.6) - 0.6))
+    assert asked_m_s2(0.1, -0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 + 0.15 * 0.6) + 0.6))
+    # but not by more than it has left: what pushes it goes along with it
+    assert asked_m_s2(0.0, 0.6) == pytest.approx(-7.0 * (2.5 * 0.35 - 0.6))
+
+
 def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked():
     off = Belief(HERE, (-2.0, 0.0, 0.0))
     certain, doubtful, unknown = (wanted(replace(off, spread_m_s=s), [WALL], HERE[2])[0] for s in (0.0, 0.6, 5.0))
