@@ -305,7 +305,8 @@ class FusedDetector:
         unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
-        size, least = math.hypot(*step), jump.least_m_s(config, caution) + unseen_m_s
+        least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s) + unseen_m_s
+        size = math.hypot(*step)
         corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit

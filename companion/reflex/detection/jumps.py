@@ -119,6 +119,13 @@ class VelocityJump:
         delay_s, told = (slope.found(self.variance_m2_s2)[0] for slope in (self.delay, self.told))
         return plus(plus(self.newest[0], told, turn), delay_s, change)
 
+    @property
+    def error_m_s(self) -> float:
+        """Standard deviation of the newest step by that of what explains it."""
+        _, change, turn = self.newest
+        delay_s, told = (slope.found(self.variance_m2_s2)[1] for slope in (self.delay, self.told))
+        return math.hypot(told * math.hypot(*turn), delay_s * math.hypot(*change))
+
     def least_m_s(self, config: reflex.FusedConfig, caution: float) -> float:
         """The step, m/s, that is a hit; infinite before the first step.
 

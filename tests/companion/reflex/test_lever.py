@@ -197,15 +197,17 @@ def test_a_turn_that_the_contact_itself_makes_is_in_the_expected_rebound() -> No
 @pytest.mark.parametrize("is_told", [False, True])
 def test_velocities_are_those_of_the_sensor_or_of_the_centre_as_the_vehicle_has_been_told(is_told) -> None:
     # Given a vehicle that rolls to and fro, its sensor 0.08 m above the centre, and velocities with 0.01 m/s of noise
-    jump, noise, fixes, sizes = VelocityJump(), random.Random(3), list[VelocityFix](), list[float]()
+    jump, noise, fixes, sizes = VelocityJump(), random.Random(3), list[VelocityFix](), list[tuple[float, float]]()
     for tick in range(300):
         turns = (0.0, 0.4 * math.sin(0.3 * tick), 0.0)
         seen = (noise.gauss(0.0, 0.01), (0.0 if is_told else turns[1]) + noise.gauss(0.0, 0.01), 0.0)
         fixes.append(VelocityFix(33_000 * tick, seen, turns, turns))
         step = jump.step_m_s(fixes)
         if step is not None:
-            sizes.append(math.hypot(*step))
+            sizes.append((math.hypot(*step), jump.error_m_s))
             jump.learn(step)
-    # Then what is left of either is noise, once that is known
-    assert max(sizes[20:]) < 0.06
+    # Then what is left of either is noise, once that is known, and until then no more than may be
+    assert max(size for size, _ in sizes[20:]) < 0.06
+    assert max(size - 4.2 * error for size, error in sizes) < 0.06
+    assert sizes[-1][1] < 0.02
     assert jump.told.found(jump.variance_m2_s2)[0] == pytest.approx(float(is_told), abs=0.02)
