@@ -68,7 +68,7 @@ class Lever:
     _samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = field(default_factory=list)
     """H, and what is shown of f_x and f_y, of those to be learnt from; they are, every RATE_MEMORY_US."""
     _since_s: float = 0.0
-    _yawed_rad: float = 0.0  # in these
+    _yawed_rad: float = 0.0  # since the mean was turned last
     _mean: Floats = field(default_factory=lambda: np.zeros((2, 4)))  # of H, and of what is shown of f_x and f_y
     _square: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     _against: Floats = field(default_factory=lambda: np.zeros(3))

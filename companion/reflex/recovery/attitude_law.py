@@ -60,9 +60,9 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
         # What pushes the vehicle goes along with it, and is not left.
         off_m += min(reflex.LEAD_S * _certain_m_s(belief, one.normal_ned), max(off_m, 0.0))
         if off_m < one.distance_m:
-            near.append((one.normal_ned, reflex.RETURN_PER_S * (one.distance_m - off_m)))
-    for normal, off_m_s in near:
-        velocity = _certain(velocity, normal, belief.spread_m_s, off_m_s)
+            off_m_s = reflex.RETURN_PER_S * (one.distance_m - off_m)
+            near.append((one.normal_ned, off_m_s))
+            velocity = _certain(velocity, one.normal_ned, belief.spread_m_s, off_m_s)
     off = projected(ZERO, near)
     short, moves = minus(off, velocity), plus(belief.tilt_m_s2, 1.0, external)
     n, e, _ = minus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), moves)

@@ -208,6 +208,10 @@ def test_a_jump_that_the_estimator_counts_or_that_no_filtered_sample_shows_is_no
     assert len(Flight(imu_every_us=20_000, jump=jump, heard=heard, is_filtered=is_filtered).fly()) == hits
 
 
+def test_a_sudden_climb_is_no_hit_before_it_is_known_how_late_velocities_are():
+    assert Flight(lift=lambda t: GRAVITY * (2.6 if t >= 2_976_000 else 1.0)).fly(3_600_000) == []
+
+
 def test_a_hit_is_no_noise_that_would_hide_the_next_one():
     struck, free = (Flight(pulse((f, 0.0, 0.0)), 20_000, velocity_noise=0.05) for f in (-3000.0, 0.0))
     assert (len(struck.fly(3_400_000)), len(free.fly(3_400_000))) == (1, 0)

@@ -164,11 +164,14 @@ def test_a_vehicle_that_leaves_a_wall_is_at_rest_within_a_second_and_clear(speed
 
 
 def test_what_has_left_a_wall_is_led_off_it_by_where_it_will_be_when_its_thrust_has_turned():
-    def asked_m_s2(off_m, speed_m_s):
-        return wanted(Belief(plus(HERE, off_m, SOUTH), plus(ZERO, speed_m_s, SOUTH)), [WALL], HERE[2])[0]
+    def asked_m_s2(off_m, speed_m_s, spread_m_s=0.0):
+        belief = Belief(plus(HERE, off_m, SOUTH), plus(ZERO, speed_m_s, SOUTH), spread_m_s)
+        return wanted(belief, [WALL], HERE[2])[0]
 
     assert asked_m_s2(0.1, 0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 - 0.15 * 0.6) - 0.6))
     assert asked_m_s2(0.1, -0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 + 0.15 * 0.6) + 0.6))
+    # and of a speed that is not certain by what is
+    assert asked_m_s2(0.1, 0.6, 0.1) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 - 0.15 * 0.5) - 0.5))
     # but not by more than it has left: what pushes it goes along with it
     assert asked_m_s2(0.0, 0.6) == pytest.approx(-7.0 * (2.5 * 0.35 - 0.6))
 
