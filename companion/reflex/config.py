@@ -123,10 +123,9 @@ FREE_M_S = 0.5
 SMOOTHING_S = 0.2
 # What an external force takes of the acceleration, besides what drag and wind took before: 12 degrees of tilt. A gust
 # of 5 m/s takes 1.5 m/s^2 with a drag of 0.3 per second. Arms that press on a wall carry a vehicle that leans by 15
-# degrees; from 22 on it is tipped over.
+# degrees; from 22 on it is tipped over. So one that a hit has turned onto a surface presses on it by no more.
 HELD_M_S2 = 2.0
-# Half of it: what pushes off a surface that was just hit is that surface from then on. A vehicle that a hit has turned
-# onto a surface presses on it by no more. Who judged it: bench/notes/decisions.md.
+# Half of it: what pushes off a surface that was just hit is that surface from then on (bench/notes/decisions.md).
 PRESSES_M_S2 = 0.5 * HELD_M_S2
 # By then a vehicle has followed its attitude setpoint: twice its attitude's lag. A lean beyond all setpoints since, and
 # beyond what lies between them, is by an external torque. Of real PX4s in free flight it is a sine of 0.05 at most

@@ -141,7 +141,7 @@ def _thrust_m_s2(asked_m_s2: Vector3, lean: Lean) -> float:
     for one in near:
         # What a hit has turned onto it, and is to lean off it, presses by less than tips it over.
         if one.off_m(place) < reflex.PLACE_SPREAD_M and along((n, e, d - GRAVITY_M_S2), one.normal_ned) > 0.0:
-            thrust_m_s2 = min(thrust_m_s2, -reflex.PRESSES_M_S2 / along(ahead, one.normal_ned))
+            thrust_m_s2 = min(thrust_m_s2, -reflex.HELD_M_S2 / along(ahead, one.normal_ned))
     return thrust_m_s2
 
 

@@ -203,7 +203,7 @@ def test_what_is_held_is_safe_by_what_is_certain_of_the_speed_away_from_a_surfac
 
 @pytest.mark.parametrize(
     ("off_m", "velocity_m_s", "presses_m_s2"),
-    [(0.0, -0.3, set_to.PRESSES_M_S2), (0.2, 0.0, math.inf), (0.0, -2.5, math.inf)],
+    [(0.0, -0.3, set_to.HELD_M_S2), (0.2, 0.0, math.inf), (0.0, -2.5, math.inf)],
     ids=["turned onto it", "not at it", "follows it"],
 )
 def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, velocity_m_s, presses_m_s2):
