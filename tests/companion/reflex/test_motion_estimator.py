@@ -131,6 +131,18 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
     assert sum(within) >= 0.95 * len(within)
 
 
+def test_a_bias_that_a_hit_has_left_moves_no_vehicle_that_rests():
+    # Given a vehicle at rest whose accelerometer and velocity say that it moves, and its places that it does not
+    found, strapdown = reckoned(), Strapdown()
+    for tick in range(1, 1500):
+        strapdown.imu(HIT_US + 4_000 * tick, (-0.3, 0.0, -GRAVITY_M_S2), ZERO)
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            found.update(LocalPosition(strapdown.time_boot_us, AT, (-0.1, 0.0, 0.0)))
+    # Then after some seconds the places count
+    assert math.hypot(*found.motion.velocity_ned_m_s) < 0.035
+
+
 @pytest.mark.parametrize(("later_s", "fits"), [(0.06, True), (0.06, False), (1.0, True)])
 def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust_has_added(later_s, fits):
     # Given a contact of 20 ms whose own force is less than 1 g
