@@ -232,7 +232,9 @@ def _attitude(topic: Topic) -> Iterator[LoggedSample]:
 
 def _quaternions(angles_deg: Floats | None) -> Floats | None:
     """Body to NED, of roll, pitch and yaw."""
-    return None if angles_deg is None else np.array([QuaternionBase(row).q for row in np.radians(angles_deg)])
+    if angles_deg is None:
+        return None
+    return np.array([QuaternionBase(row).q for row in np.radians(angles_deg)]).reshape(-1, 4)  # of no sample, too
 
 
 def _attitude_targets(throttle: Topic, attitude: Topic) -> Iterator[LoggedSample]:

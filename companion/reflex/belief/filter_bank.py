@@ -94,13 +94,13 @@ class FilterBank:
         hidden, pushed = self.state[..., 2], np.array(level_m_s2)
         along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
         self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
-        leads = np.eye(4)
-        leads[0, 1] = leads[1, 3] = elapsed_s
-        leads[0, 3] = 0.5 * elapsed_s**2
+        leads = np.eye(self.state.shape[-1])
+        leads[0, 1] = leads[1, -1] = elapsed_s
+        leads[0, -1] = 0.5 * elapsed_s**2
         self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0, 0.0]
         self.covariance = leads @ self.covariance @ leads.T
         self.covariance[:, 1, 1] += DRIFT_M2_S3 * elapsed_s
-        self.covariance[:, 3, 3] += LEVEL_DRIFT_M2_S5 * elapsed_s
+        self.covariance[:, -1, -1] += LEVEL_DRIFT_M2_S5 * elapsed_s
 
     def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
         """Take a reported position (0) or velocity (1), with each model's share of e in it."""

@@ -39,7 +39,7 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision, companion=flying)
     f.run_to_end(200)
     assert items_flown(f) == [2, 2, 2], "the rest of the mission is not flown"
-    assert [hit.impact_speed_m_s for hit in f.report.collisions] == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
+    assert [hit.impact_speed_m_s for hit in f.report.collisions] == pytest.approx([2.0, 1.4, 0.98], rel=0.2)
     assert "at 49% of the speed" in f.event("item", 2).text
     assert "recovery 3 of at most 3; after the recovery: return" in f.event("policy").text
     assert f.report.outcome == "completed" and "not flown from item 2 on" in f.report.reason

@@ -188,6 +188,7 @@ LOGS = {"log.ulg": ULOG, "log.tlog": TELEMETRY.content, "log.bin": DATAFLASH}
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes, cuts)
 @example([], 1.0)
+@example([(0.4302391427239161, b"\x00"), (0.4439984279533176, b"\x01")], 1.0)  # no attitude is left
 def test_a_damaged_log_of_each_kind(tmp_path, name, spots, kept):
     read_or_refused(tmp_path / name, damaged(LOGS[name], spots, kept))
 
