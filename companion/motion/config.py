@@ -50,7 +50,7 @@ DRIFT_M2_S3 = 0.03
 # Standard deviation of the acceleration that a tilt makes which is wrong by the gyroscopes, too: 3 degrees.
 LEVEL_SPREAD_M_S2 = 0.5
 # How fast that acceleration spreads, (m/s^2)^2 in a second: after a clipped hit PX4 takes 0.01 rad/s of a turn for the
-# gyroscopes' bias, and takes it off HIGHRES_IMU.
+# gyroscopes' bias, and takes it off HIGHRES_IMU. It stands for a change of the accelerometer's, too.
 LEVEL_DRIFT_M2_S5 = (0.01 * GRAVITY_M_S2) ** 2
 
 # --- a receiver's place and velocity

@@ -6,8 +6,9 @@ position, until other sensors correct both. At a time t after the hit the vehicl
     v(t) + e g(t),    x(t) + e G(t)
 
 for its velocity v and position x, where e is the error just after the hit (see `filter_bank`). Between two reports the
-accelerometer is integrated. A bank of Kalman filters estimates x, v and e, each by one hypothesis of g and G, and
-weighted by the likelihood of its innovations (Magill 1965). Before the first report v is the expected rebound.
+accelerometer is integrated. A bank of Kalman filters estimates x, v, e and what the accelerometer lacks, each by
+one hypothesis of g and G, and weighted by the likelihood of its innovations (Magill 1965). Before the first report v is
+the expected rebound.
 """
 
 import math
