@@ -61,6 +61,7 @@ class MessageId(IntEnum):
 
     HEARTBEAT = 0
     GPS_RAW_INT = 24
+    SCALED_IMU = 26
     RAW_IMU = 27
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
@@ -100,6 +101,15 @@ class Heartbeat(Sample):
 @dataclass(frozen=True, slots=True)
 class ImuSample(Sample):
     """HIGHRES_IMU: mean over the vehicle's integration interval that ends at `time_boot_us`."""
+
+    time_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    angular_velocity_frd_rad_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class ScaledImu(Sample):
+    """SCALED_IMU: a sample of PX4's as it is measured, without what its estimator takes for biases."""
 
     time_boot_us: int
     specific_force_frd_m_s2: Vector3

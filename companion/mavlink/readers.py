@@ -74,7 +74,7 @@ def _imu(
     return messages.ImuSample(time_usec, force, rates)
 
 
-# What RAW_IMU counts in, SI: thousandths of standard gravity, and of a radian a second.
+# What RAW_IMU and SCALED_IMU count in, SI: thousandths of standard gravity, and of a radian a second.
 _MILLI_G_M_S2, _MILLI_RAD_S = 9.80665e-3, 1e-3
 
 
@@ -83,6 +83,12 @@ def _raw_imu(time_usec: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro:
     force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
     rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
     return _imu(time_usec, *force, *rates, ACCELEROMETER_UPDATED)
+
+
+def _scaled_imu(time_boot_ms: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> Sample:
+    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
+    rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
+    return messages.ScaledImu(time_boot_ms * 1000, force, rates)
 
 
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
@@ -316,6 +322,7 @@ READERS = _readers(
         dialect.MAVLink_attitude_quaternion_message: _attitude,
         dialect.MAVLink_odometry_message: _odometry,
         dialect.MAVLink_gps_raw_int_message: _gps_raw,
+        dialect.MAVLink_scaled_imu_message: _scaled_imu,
         dialect.MAVLink_heartbeat_message: _heartbeat,
         dialect.MAVLink_attitude_target_message: _attitude_target,
         dialect.MAVLink_vibration_message: _vibration,

@@ -1,5 +1,7 @@
 """Numbers of streams, of the integrated accelerometer and of rest, with unit and source."""
 
+import math
+
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- time
@@ -34,6 +36,13 @@ TILT_RAD_PER_M_S = 0.11
 # Largest angular acceleration by motors, rad/s^2.
 MOTORS_RAD_S2 = 100.0
 
+# HIGHRES_IMU has the time of a sample, SCALED_IMU the millisecond in which PX4 went on with it.
+SAME_SAMPLE_US = 2 * STAMP_RESOLUTION_US
+# Two samples of SCALED_IMU are rounded by thousandths of g, on three axes: three times that.
+ROUNDED_M_S2 = 3.0 * math.sqrt(3.0) * 1e-3 * GRAVITY_M_S2
+# Largest change of an estimator's biases: PX4's EKF2_ABL_LIM and EKF2_GYR_B_LIM, from one end to the other.
+MOST_BIAS_M_S2, MOST_BIAS_RAD_S = 0.8, 0.3
+
 # What is further off, in standard deviations, is beyond belief: PX4's gates, such as EKF2_GPS_V_GATE.
 GATE = 5.0
 # Memory of a velocity's noise in velocities: 3 s of the vehicle's own at 30 Hz, 10 to 20 s of a receiver's.
@@ -45,8 +54,9 @@ DELAY_S = 0.01
 # Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
 LATEST_S = 0.1
 
-# Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
-DRIFT_M2_S3 = 0.03
+# Process noise of the accelerometer's integral: an attitude that is wrong by 0.8 degrees for 1 s. After hits of a real
+# PX4 it is 0.02 to 0.16 m/s off by then.
+DRIFT_M2_S3 = 0.02
 # Standard deviation of the acceleration that a tilt makes which is wrong by the gyroscopes, too: 3 degrees.
 LEVEL_SPREAD_M_S2 = 0.5
 # How fast that acceleration spreads, (m/s^2)^2 in a second: after a clipped hit PX4 takes 0.01 rad/s of a turn for the

@@ -225,8 +225,6 @@ TILT_PER_S = 0.5
 MODEL_ERROR = 0.03
 # A receiver is needed no more once the reported velocity has agreed with its for so long: a swing only passes through.
 COMPARED_S = 0.5
-# PX4's EKF2_ABL_LIM: more than this its estimator takes for no bias of the accelerometer.
-MOST_BIAS_M_S2 = 0.4
 # The logistic function with this factor differs from the normal distribution's by less than 1 %.
 LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames

@@ -41,7 +41,8 @@ class Attacker:
         v, kind = self._vehicle, mav.mavlink_map[message_id]
         now = {"time_usec": v.time_us, "time_boot_ms": v.time_us // 1000, "q1": 1.0, "fields_updated": 0x3F}
         now |= dict(zip(("x", "y", "z", "vx", "vy", "vz"), (*v.position, *v.velocity), strict=True))
-        now |= dict(zip(("xacc", "yacc", "zacc"), v.specific_force, strict=True))
+        is_real = "float" in kind.fieldtypes
+        now |= {n: f if is_real else round(f) for n, f in zip(("xacc", "yacc", "zacc"), v.specific_force, strict=True)}
         now |= {"frame_id": 1, "child_frame_id": 1, "autopilot": v.autopilot, "type": v.vehicle_type}
         now |= {"custom_mode": v.mode, "base_mode": 0x9D if v.armed else 0x1D, "landed_state": v.landed, "thrust": 0.5}
         now["system_status"] = 4 if v.armed else 3

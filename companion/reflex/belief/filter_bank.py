@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.messages import Vector3
-from companion.motion.config import DRIFT_M2_S3, LEVEL_DRIFT_M2_S5
+from companion.motion.config import DRIFT_M2_S3
 from companion.motion.vector import ZERO, minus
 from companion.reflex import config as reflex
 from companion.reflex.surface import MotionState
@@ -51,10 +51,9 @@ def tilt_response(errors: Floats, pushed_m_s2: Floats, elapsed_s: float) -> Floa
 
 
 class FilterBank:
-    """Kalman filters of x, v, e, b: states (models, axes, 4), covariances of an axis (models, 4, 4); in the last e = 0.
+    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); in the last e = 0.
 
-    v' = a + b: since the hit the accelerometer shows b less than there is, as its attitude or its bias is wrong. Local
-    NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
+    Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
     def __init__(
@@ -70,9 +69,8 @@ class FilterBank:
         `summed_m_s`: the accelerometer's integral until then.
         """
         self.time_boot_us, self._summed_m_s = time_boot_us, summed_m_s
-        models = len(_RAD_S)
-        state = np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s, ZERO], axis=1)
-        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s, 0.0)
+        models, state = len(_RAD_S), np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
+        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
         self.log_likelihoods, self.leaves = np.zeros(models), np.ones(models)
@@ -94,13 +92,10 @@ class FilterBank:
         hidden, pushed = self.state[..., 2], np.array(level_m_s2)
         along_e = hidden @ pushed / np.maximum((hidden**2).sum(axis=1), 1e-9)
         self.tilted = tilt_response(self.tilted, pushed - along_e[:, None] * hidden, elapsed_s)
-        leads = np.eye(self.state.shape[-1])
-        leads[0, 1] = leads[1, -1] = elapsed_s
-        leads[0, -1] = 0.5 * elapsed_s**2
-        self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0, 0.0]
+        leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
         self.covariance = leads @ self.covariance @ leads.T
         self.covariance[:, 1, 1] += DRIFT_M2_S3 * elapsed_s
-        self.covariance[:, -1, -1] += LEVEL_DRIFT_M2_S5 * elapsed_s
 
     def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
         """Take a reported position (0) or velocity (1), with each model's share of e in it."""
@@ -128,15 +123,10 @@ class FilterBank:
         `left` is each model's remaining amplitude.
         """
         share = self._probabilities()
-        (x, y, z), (u, v, w), *_ = np.einsum("w,wai->ia", share, self.state).tolist()
+        (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
         spread2 = (share @ (self.covariance[:, 1, 1, None] + (self.state[..., 1] - [u, v, w]) ** 2)).max()
         left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
         return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
-
-    def mean_error(self, which: int, share: Floats) -> Vector3:
-        """Mean error of the reported position (0) or velocity (1), with each model's share of e in it."""
-        n, e, d = (self._probabilities() @ (share[:, None] * self.state[..., 2] + self.tilted[which])).tolist()
-        return (n, e, d)
 
     def _probabilities(self) -> Floats:
         """Probability of each model."""

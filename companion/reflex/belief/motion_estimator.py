@@ -6,9 +6,8 @@ position, until other sensors correct both. At a time t after the hit the vehicl
     v(t) + e g(t),    x(t) + e G(t)
 
 for its velocity v and position x, where e is the error just after the hit (see `filter_bank`). Between two reports the
-accelerometer is integrated. A bank of Kalman filters estimates x, v, e and what the accelerometer lacks, each by
-one hypothesis of g and G, and weighted by the likelihood of its innovations (Magill 1965). Before the first report v is
-the expected rebound.
+accelerometer is integrated. A bank of Kalman filters estimates x, v and e, each by one hypothesis of g and G, and
+weighted by the likelihood of its innovations (Magill 1965). Before the first report v is the expected rebound.
 """
 
 import math
@@ -38,7 +37,7 @@ class Belief:
     velocity_ned_m_s: Vector3
     spread_m_s: float = 0.0  # standard deviation of the velocity
     tilt_m_s2: Vector3 = ZERO  # horizontal acceleration of the thrust, TILT_AHEAD_S ahead
-    external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind and drag
+    external_m_s2: Vector3 = ZERO  # horizontal acceleration by wind
     attitude_wxyz: Quaternion = LEVEL
     yaw_rate_rad_s: float = 0.0
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude
@@ -65,6 +64,7 @@ class MotionEstimator:
     has_converged: bool = False  # what is wrong of the vehicle's own estimate is known
     known_wind_m_s2: Vector3 = ZERO  # horizontal specific force across the thrust, as in the last hover before it
     external_m_s2: Vector3 = ZERO  # and by now
+    wind_m_s2: Vector3 = ZERO  # of that what lasts: drag is none at rest
     level_m_s2: Vector3 = ZERO  # acceleration of a vehicle that is level by its own attitude, by gyroscopes, NED
     _sinks_m_s2: float = 0.0  # by how much less than by its own attitude its thrust lifts
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
@@ -96,7 +96,7 @@ class MotionEstimator:
 
     def note_wind(self, known_m_s2: Vector3) -> None:
         """Take the horizontal specific force across the thrust of the last hover before the hit."""
-        self.known_wind_m_s2 = self.external_m_s2 = known_m_s2
+        self.known_wind_m_s2 = self.external_m_s2 = self.wind_m_s2 = known_m_s2
 
     def _begin(self, impulse_m_s: float = 0.0) -> None:
         self._bank, self._measured, self._same = None, None, Lasting()
@@ -123,9 +123,7 @@ class MotionEstimator:
         """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
         self._time_boot_us = time_us
-        if time_us - self.hit_boot_us < reflex.CORRECTED_US or self.is_measured_apart:
-            # Then the reported attitude counts, although it has not become right: only the gyroscopes drift further.
-            self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
+        self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
         if not 0.0 < elapsed_s < 1e-6 * numbers.LONGEST_GAP_US:
             return
         force = body_to_ned(strapdown.valid_wxyz, strapdown.centre_frd_m_s2)
@@ -148,19 +146,14 @@ class MotionEstimator:
             down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
             share = elapsed_s / (memory_s + elapsed_s)
             self.external_m_s2 = towards(self.external_m_s2, flat(split(force, down)[1]), share)
+            if self.contact_m_s2 == ZERO:
+                share = elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
+                self.wind_m_s2 = towards(self.wind_m_s2, self.external_m_s2, share)
 
     def _carry_on(self, elapsed_s: float, faster_m_s: Vector3) -> None:
         place, velocity = self.motion.position_ned_m, self.motion.velocity_ned_m_s
         place = plus(place, elapsed_s, plus(velocity, 0.5, faster_m_s))
         self.motion = MotionState(place, plus(velocity, 1.0, faster_m_s))
-
-    @property
-    def _bias_m_s2(self) -> Vector3:
-        """Of a clipped hit PX4's estimator takes a part for the accelerometer's bias, and takes it off HIGHRES_IMU.
-
-        What was there before the hit is none.
-        """
-        return limited(self._new_m_s2, 0.0 if self.is_fully_measured else reflex.MOST_BIAS_M_S2)
 
     @property
     def _new_m_s2(self) -> Vector3:
@@ -181,11 +174,6 @@ class MotionEstimator:
         normal = away_from(self.normal.direction_ned)
         off_m_s2 = min(along(new, normal), along(all_m_s2, normal))
         return new if least_m_s2 > reflex.HELD_M_S2 or off_m_s2 > reflex.PRESSES_M_S2 else ZERO
-
-    @property
-    def wind_m_s2(self) -> Vector3:
-        """External force per mass across the thrust, horizontal: wind and drag."""
-        return self.known_wind_m_s2 if self.contact_m_s2 != ZERO else minus(self.external_m_s2, self._bias_m_s2)
 
     def belief(self, strapdown: Strapdown) -> Belief:
         """What the attitude law goes by."""
@@ -249,7 +237,8 @@ class MotionEstimator:
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
-        is_right = self.is_valid or (not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
+        is_right = self.is_fully_measured or self.has_faded
+        is_right = is_right or (not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
         return 0.0 if is_right else min(numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s), reflex.TIPPED_RAD)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
@@ -323,8 +312,7 @@ class MotionEstimator:
         if self._is_right:
             bank.drop_errors()
             half = ZERO
-        # A part of the tilt balances a bias of the accelerometer in the vehicle's own velocity.
-        level_m_s2 = minus(self.level_m_s2, self._bias_m_s2)
+        level_m_s2 = self.level_m_s2
         if not self.fits_models:
             # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 corrects its own sooner.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
@@ -357,20 +345,21 @@ class MotionEstimator:
             is_calm = is_calm and is_late and not is_apart
         self.has_converged = self._is_right or is_calm
         self._believe(estimate, 0.0 if self.has_converged else spread_m_s)
+        if self.is_fully_measured:
+            self.position_error_m = self.velocity_error_m_s = ZERO
+            return
+        self.velocity_error_m_s = minus(velocity, self.motion.velocity_ned_m_s)
+        if is_apart or not self._has_agreed:
+            self.position_error_m = flat(minus(place, self.motion.position_ned_m))
         if is_apart:
-            self._compare(place, velocity, sample.time_boot_us)
-        else:
-            self.velocity_error_m_s = bank.mean_error(1, g)
-            self.position_error_m = self.position_error_m if self._has_agreed else flat(bank.mean_error(0, way_s))
+            self._compare(sample.time_boot_us)
 
-    def _compare(self, place_ned_m: Vector3, velocity_ned_m_s: Vector3, time_boot_us: int) -> None:
-        """Take a report, as of now, beside what a receiver shows. Once the two have agreed for a while the receiver is
-        needed no more, and the belief goes on by the report alone.
+    def _compare(self, time_boot_us: int) -> None:
+        """Take a report beside what a receiver shows. Once the two have agreed for a while the receiver is needed no
+        more, and the belief goes on by the report alone.
         """
-        self.position_error_m = flat(minus(place_ned_m, self.motion.position_ned_m))
-        self.velocity_error_m_s = off_m_s = minus(velocity_ned_m_s, self.motion.velocity_ned_m_s)
         # `spread_m_s` is the measured one's.
-        is_same = math.hypot(*flat(off_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
+        is_same = math.hypot(*flat(self.velocity_error_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
         self._same.update(is_same, time_boot_us)
         if self._same.lasts_us > 1e6 * reflex.COMPARED_S:
             self._has_agreed = True

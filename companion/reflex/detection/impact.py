@@ -3,7 +3,18 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.messages import Attitude, GpsFix, ImuSample, LocalPosition, Odometry, Quaternion, Sample, Vector3
+from companion.messages import (
+    Attitude,
+    GpsFix,
+    ImuSample,
+    LocalPosition,
+    Odometry,
+    Quaternion,
+    Sample,
+    ScaledImu,
+    Vector3,
+)
+from companion.motion.biases import TakenBiases
 from companion.motion.config import SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.doppler import Doppler
 from companion.motion.rotation import body_to_ned
@@ -88,6 +99,7 @@ class ImpactEstimator(Motion):
     config: EstimateConfig
     recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
     doppler: Doppler = field(default_factory=Doppler)
+    biases: TakenBiases = field(default_factory=TakenBiases)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -116,6 +128,8 @@ class ImpactEstimator(Motion):
             self.doppler.take(sample, self.strapdown, self.history.latest, is_free)
             for after in self.followed:
                 after.measure(self.doppler)
+        elif isinstance(sample, ScaledImu):
+            self.biases.take(sample, not self.followed)
         elif isinstance(sample, Attitude):
             most_wrong_rad = 0.0 if self.after is None else self.after.tilt_error_rad(sample.time_boot_us)
             self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, most_wrong_rad)

@@ -123,6 +123,7 @@ def advance(
             imu_samples += 1
             if monitor.lateness.is_late(sample.time_boot_us, estimator.strapdown.time_boot_us):
                 continue
+            sample = estimator.biases.given_back(sample, not estimator.followed)
         elif type(sample) is Attitude and not monitor.gate.attitude(sample):
             continue
         elif type(sample) is Refused:

@@ -1,7 +1,7 @@
 """The law of the first second: attitude and collective thrust, for each IMU sample, from the companion's own belief.
 
-With position x, velocity v and the acceleration e by wind, drag and contact, and b the acceleration by the thrust at
-the tilt of TILT_AHEAD_S later, horizontally
+With position x, velocity v and the acceleration e by the wind, and b the acceleration by the thrust at the tilt of
+TILT_AHEAD_S later, horizontally
 
     a = k (v_o - v) - (b + e) - e,        k = BRAKING_PER_S
 

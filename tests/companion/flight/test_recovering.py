@@ -278,7 +278,7 @@ def test_what_slides_round_a_pole_leads_off_the_side_that_pushes_and_does_not_le
 def test_the_wind_is_sent_to_a_position_control_that_begins_without_it(keeps_trim, wind_m_s2):
     flight = flight_with()
     flight.reflex.keeps_trim, estimator = keeps_trim, flight.collisions[0].estimator
-    estimator.has_converged, estimator.external_m_s2 = True, (0.0, 1.0, 0.0)
+    estimator.has_converged, estimator.wind_m_s2 = True, (0.0, 1.0, 0.0)
     assert flight.reflex.left_wrong(HIT_US + 1_000_000).pushed_m_s2 == (0.0, wind_m_s2, 0.0)
 
 

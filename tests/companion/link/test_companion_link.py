@@ -29,7 +29,7 @@ def failed(vehicle: FakeVehicle):
         (FakeVehicle(silent=True), "no HEARTBEAT from an autopilot within 10 s"),
         (FakeVehicle(autopilot=3), "ArduPilot"),
         (FakeVehicle(vehicle_type=1), "not a multicopter (MAV_TYPE 1)"),
-        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 32.0 Hz"),
+        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 31.8 Hz"),
         (FakeVehicle(no_imu=True), "HIGHRES_IMU arrives at 0.0 Hz"),
         (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),
         (FakeVehicle(armed=True), "armed already"),
@@ -120,7 +120,7 @@ def test_the_streams_that_the_detector_uses_are_asked_for_and_the_vehicles_time_
     f = flight(confirmed=False)
     f.run_to("ready")
     asked = {int(m.param1): m.param2 for _, m in f.vehicle.commands if m.command == 511}
-    always = {105: 4000, 32: 20_000, 31: 20_000, 245: 200_000, 436: 100_000, 24: 100_000}
+    always = {105: 4000, 32: 20_000, 31: 20_000, 245: 200_000, 436: 100_000, 24: 100_000, 26: 40_000}
     assert asked == always | {83: 33_333, 331: 33_333}
     assert len(f.vehicle.timesyncs) > 5
     answer = f.vehicle.timesyncs[-1]
