@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
 from companion.mavlink.encode import COMPONENT_ID, IGNORE_POSITION
-from companion.messages import Refused, Sample, is_rotation
+from companion.messages import Refused, Sample, Vector3, is_rotation
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
@@ -78,17 +78,20 @@ def _imu(
 _MILLI_G_M_S2, _MILLI_RAD_S = 9.80665e-3, 1e-3
 
 
+def _in_si(xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> tuple[Vector3, Vector3]:
+    """Specific force and rates."""
+    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
+    return force, (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
+
+
 def _raw_imu(time_usec: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> Sample | None:
     """As ArduPilot has it: the same samples as in HIGHRES_IMU, rounded."""
-    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
-    rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
+    force, rates = _in_si(xacc, yacc, zacc, xgyro, ygyro, zgyro)
     return _imu(time_usec, *force, *rates, ACCELEROMETER_UPDATED)
 
 
 def _scaled_imu(time_boot_ms: int, xacc: int, yacc: int, zacc: int, xgyro: int, ygyro: int, zgyro: int) -> Sample:
-    force = (_MILLI_G_M_S2 * xacc, _MILLI_G_M_S2 * yacc, _MILLI_G_M_S2 * zacc)
-    rates = (_MILLI_RAD_S * xgyro, _MILLI_RAD_S * ygyro, _MILLI_RAD_S * zgyro)
-    return messages.ScaledImu(time_boot_ms * 1000, force, rates)
+    return messages.ScaledImu(time_boot_ms * 1000, *_in_si(xacc, yacc, zacc, xgyro, ygyro, zgyro))
 
 
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:

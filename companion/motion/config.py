@@ -55,12 +55,12 @@ DELAY_S = 0.01
 LATEST_S = 0.1
 
 # Process noise of the accelerometer's integral: an attitude that is wrong by 0.8 degrees for 1 s. After hits of a real
-# PX4 it is 0.02 to 0.16 m/s off by then.
+# PX4 it is 0.05 to 0.16 m/s off by then.
 DRIFT_M2_S3 = 0.02
 # Standard deviation of the acceleration that a tilt makes which is wrong by the gyroscopes, too: 3 degrees.
 LEVEL_SPREAD_M_S2 = 0.5
 # How fast that acceleration spreads, (m/s^2)^2 in a second: after a clipped hit PX4 takes 0.01 rad/s of a turn for the
-# gyroscopes' bias, and takes it off HIGHRES_IMU. It stands for a change of the accelerometer's, too.
+# gyroscopes' bias, and takes it off HIGHRES_IMU.
 LEVEL_DRIFT_M2_S5 = (0.01 * GRAVITY_M_S2) ** 2
 
 # --- a receiver's place and velocity

@@ -237,8 +237,8 @@ class MotionEstimator:
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
-        is_right = self.is_fully_measured or self.has_faded
-        is_right = is_right or (not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US)
+        is_early = not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US
+        is_right = self.is_fully_measured or self.has_faded or is_early
         return 0.0 if is_right else min(numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s), reflex.TIPPED_RAD)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:

@@ -7,7 +7,7 @@ import pytest
 from companion.autopilot.px4.firmware import PX4
 from companion.messages import ImuSample, MessageId, ScaledImu
 from companion.motion.biases import TakenBiases
-from companion.motion.config import GRAVITY_M_S2, MEMORY_STEPS, MOST_BIAS_M_S2, MOST_BIAS_RAD_S, SAME_SAMPLE_US
+from companion.motion.config import GRAVITY_M_S2, MEMORY_STEPS
 from companion.motion.vector import ZERO, plus
 from companion.reflex.detection.detector import Situation
 from companion.reflex.detection.monitor import CollisionMonitorConfig, advance, start_monitor
@@ -46,7 +46,7 @@ def after_a_hit(taken, *, is_later=True, stamp_us=0, learns=True):
 
 
 @pytest.mark.parametrize("is_later", [True, False])
-@pytest.mark.parametrize("stamp_us", [-SAME_SAMPLE_US, 0, SAME_SAMPLE_US])
+@pytest.mark.parametrize("stamp_us", [-2_000, 0, 2_000])
 def test_what_the_estimator_takes_since_a_hit_is_given_back_and_what_it_had_found_before_stays_off(is_later, stamp_us):
     found, _ = after_a_hit(both(TURN_ON, HIT), is_later=is_later, stamp_us=stamp_us)
     assert found.specific_force_frd_m_s2 == pytest.approx(plus(FORCE, -1.0, TURN_ON[0]))
@@ -54,19 +54,37 @@ def test_what_the_estimator_takes_since_a_hit_is_given_back_and_what_it_had_foun
 
 
 @pytest.mark.parametrize(
-    "taken",
-    [((1.01 * MOST_BIAS_M_S2, 0.0, 0.0), ZERO), (HIT[0], (0.0, 0.0, 1.01 * MOST_BIAS_RAD_S))],
+    ("taken", "is_bias"),
+    [
+        # From one of PX4's limits to the other: EKF2_ABL_LIM 0.4 m/s^2, EKF2_GYR_B_LIM 0.15 rad/s
+        (((0.79, 0.0, 0.0), ZERO), True),
+        (((0.81, 0.0, 0.0), ZERO), False),
+        ((HIT[0], (0.0, 0.0, 0.29)), True),
+        ((HIT[0], (0.0, 0.0, 0.31)), False),
+    ],
 )
-def test_more_than_an_estimator_takes_for_a_bias_is_another_sensor(taken):
+def test_more_than_an_estimator_takes_for_a_bias_is_another_sensor(taken, is_bias):
     found, sent = after_a_hit(both(TURN_ON, taken))
-    assert found is sent
+    assert (found is not sent) is is_bias
 
 
-def test_another_sensor_that_vibrates_by_itself_is_not_compared_with():
+def test_a_sample_that_is_rounded_is_the_same():
+    # Given a force to and fro, and SCALED_IMU, which cuts off what is less than a thousandth of g
+    biases, least_m_s2 = TakenBiases(), 0.99e-3 * GRAVITY_M_S2
+    for tick in range(202):
+        force, is_free = (least_m_s2 * (-1) ** tick,) * 3, tick < 200
+        biases.take(ScaledImu(40_000 * tick, ZERO, ZERO), is_free)
+        biases.given_back(ImuSample(40_000 * tick, plus(force, -1.0, ZERO if is_free else HIT[0]), ZERO), is_free)
+    # Then what the estimator takes is known to that
+    assert biases.force_m_s2 == pytest.approx(HIT[0], abs=0.02)
+
+
+@pytest.mark.parametrize("shakes_m_s2", [0.02, 0.1])
+def test_another_sensor_that_vibrates_by_itself_is_not_compared_with(shakes_m_s2):
     # Given a vehicle that flies by its second sensor, and what the first one measures
     biases, draw = TakenBiases(), random.Random(1)
     for tick in range(200):
-        shakes = (tuple(draw.gauss(0.0, 0.1) for _ in range(3)), ZERO)
+        shakes = (tuple(draw.gauss(0.0, shakes_m_s2) for _ in range(3)), ZERO)
         told(biases, 40_000 * tick, both(TURN_ON, shakes), is_free=tick < 150)
         # Then nothing is given back of what that says after a hit
         assert biases.force_m_s2 == ZERO
@@ -83,7 +101,7 @@ def test_one_odd_sample_forgets_nothing():
 
 
 def test_another_sample_says_nothing_of_this_one():
-    found, sent = after_a_hit(both(TURN_ON, HIT), stamp_us=SAME_SAMPLE_US + 1)
+    found, sent = after_a_hit(both(TURN_ON, HIT), stamp_us=2_001)
     assert found is sent
 
 
