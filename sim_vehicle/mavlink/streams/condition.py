@@ -34,7 +34,9 @@ _NO_LINK_STATISTICS = (0,) * 8
 _NO_STICKS = 4
 _LOAD_PER_MILLE = 100
 
-_UNKNOWN_16 = 0xFFFF
+_UNKNOWN_16, _MOST_16 = 0xFFFF, 0x7FFF
+# SCALED_IMU's unit: a thousandth of standard gravity (PX4's CONSTANTS_ONE_G).
+_MILLI_G_M_S2 = 9.80665e-3
 _UNKNOWN_CURRENT = -1
 _UNKNOWN_TEMPERATURE = 0x7FFF
 # PWM of the simulated outputs: off, and from least to greatest.
@@ -104,6 +106,16 @@ def scaled_pressure(state: Telemetry) -> Message:
     return dialect.MAVLink_scaled_pressure_message(
         boot_ms(state.sample), air.pressure_hpa, 0.0, round(100 * air.temperature_c)
     )
+
+
+def scaled_imu(state: Telemetry) -> Message:
+    """HIGHRES_IMU's sample: this vehicle's estimator takes no biases off that. PX4 cuts off fractions."""
+    sample = state.sample
+    force = (int(each / _MILLI_G_M_S2) for each in sample.specific_force_frd_m_s2)
+    rates = (int(1e3 * each) for each in sample.angular_velocity_frd_rad_s)
+    field = (int(1e3 * each) for each in state.slow.magnetic_field_frd_gauss)
+    inertial = (min(max(each, -_MOST_16), _MOST_16) for each in (*force, *rates, *field))
+    return dialect.MAVLink_scaled_imu_message(boot_ms(sample), *inertial)
 
 
 def system_time(state: Telemetry) -> Message:

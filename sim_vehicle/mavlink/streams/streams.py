@@ -77,6 +77,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(4, Topic.ALWAYS_NEW, condition.ping, Rates(1, 0.1, 0.1)),
     StreamKind(69, Topic.STICKS, condition.manual_control),
     StreamKind(29, Topic.AIR, condition.scaled_pressure, Rates(1, 1, 1)),
+    StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
     StreamKind(264, Topic.ALWAYS_NEW, condition.flight_information),
 )
 

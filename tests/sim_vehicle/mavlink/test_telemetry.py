@@ -221,6 +221,22 @@ def test_asked_and_received(monkeypatch, kind, asked_hz, received_hz, gaps):
     assert {round(1e3 * (b - a)) for a, b in pairwise(client.times(kind))} == gaps
 
 
+def test_an_imu_sample_as_measured_is_that_of_highres_imu_in_thousandths_of_g():
+    # Given both at the vehicle's fastest
+    client, answers = asked(26, 4_000)
+    assert answers == [ACCEPTED]
+    client.command(SET_INTERVAL, NUMBERS["HIGHRES_IMU"], 4_000)
+    client.run(1.0)
+    told = {each.time_usec // 1000: each for each in client.all("HIGHRES_IMU")}
+    same = [(told[each.time_boot_ms], each) for each in client.all("SCALED_IMU") if each.time_boot_ms in told]
+    # Then of each sample no more is cut off than a whole number loses
+    assert len(same) > 100
+    for one, other in same:
+        for axis in "xyz":
+            assert abs(getattr(one, f"{axis}acc") / 9.80665e-3 - getattr(other, f"{axis}acc")) < 1.001
+            assert abs(getattr(one, f"{axis}gyro") / 1e-3 - getattr(other, f"{axis}gyro")) < 1.001
+
+
 def told_interval_us(client: Client, message_id: int) -> int:
     """By both commands that ask for it."""
     client.forget()
