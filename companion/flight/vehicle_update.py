@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext
 from companion.flight.envelope import longer_loss_text
 from companion.link.vehicle import OLD_NEWS_US, Vehicle, identify, is_autopilot
 from companion.messages import MessageId, Sample
-from companion.reflex.config import HELD_S, LEAST_FRACTION, LIES_US, LONGEST_LOSS_S
+from companion.reflex.config import HELD_S, LEAST_THRUST, LIES_US, LONGEST_LOSS_S
 from companion.reflex.detection.detector import NO_POSITION, Situation
 
 
@@ -141,7 +141,7 @@ def _flies(vehicle: Vehicle) -> bool:
     """Whether it is armed, and off the ground or about to be: not one that is carried while its motors idle."""
     if vehicle.thrust_fraction is None or vehicle.landed > messages.LandedState.ON_GROUND:
         return vehicle.is_airborne
-    return vehicle.armed is True and vehicle.thrust_fraction >= LEAST_FRACTION
+    return vehicle.armed is True and vehicle.thrust_fraction >= LEAST_THRUST
 
 
 def situation_of(flight: FlightContext, off_state: str | None, goes_down: bool, is_held: bool) -> Situation:

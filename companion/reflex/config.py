@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from companion.motion.config import GRAVITY_M_S2
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the specific force's noise
@@ -45,11 +44,6 @@ CLEAR = 1.3
 JUMP = 2.4
 
 # --- thrust
-# A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
-# the maximum of the strongest vehicle.
-STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
-# Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
-LEAST_FRACTION = 0.1
 # Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 
@@ -77,8 +71,6 @@ ACROSS_THRUST = 1.0 / 3.0
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
-# The feet are 0.1 m below the centre: a vehicle at this height stands on the ground, or scrapes along it.
-SCRAPING_M = 0.1
 
 # --- the contact's force
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
@@ -92,8 +84,9 @@ SHORT = 2
 # Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
 # (bench/notes/decisions.md): friction turns a force by 17 degrees, and walls are met at up to 60 degrees.
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
-# A slower vehicle may have been struck from any side.
-APPROACH_M_S = 0.5
+# A slower vehicle may have been struck from any side, be pushed by a hand, or slide along a surface. One that is faster
+# flies, and drag and wind change with its speed.
+SLOW_M_S = 0.5
 # Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
 # behind, and the direction of flight says nothing of it.
 FROM_BEHIND = -0.5
@@ -101,10 +94,7 @@ FROM_BEHIND = -0.5
 UNKNOWN_RAD = 0.5 * math.pi
 
 # --- validity of the vehicle's velocity
-# PX4's estimator begins to correct itself after 0.14 s.
-UNCORRECTED_US = 140_000
-# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5
-# per second, bench/notes/px4.md).
+# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5 per second, bench/notes/px4.md).
 CORRECTED_US = 4_500_000
 # What is known of a hit's errors goes with every position, until it is taken away between these times: by GPS a real
 # PX4's velocity was wrong by 0.4 m/s 10 s after a hit at 3 m/s.
@@ -113,12 +103,6 @@ FADES_FROM_US, FADED_US = 6_000_000, 12_000_000
 # --- a sustained force
 # Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
 FOLLOWED_S = 1.0
-# Four times a good estimate's noise. A vehicle that moves faster with its thrust, or against it, as a gust has it, is
-# free.
-STEADY_M_S = 0.12
-# A vehicle that slides along a surface moves with its thrust, too, but no faster. Above it drag and wind are what is
-# missing now: they change with the speed.
-FREE_M_S = 0.5
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
 # What an external force takes of the acceleration, besides what drag and wind took before: 12 degrees of tilt. A gust
@@ -152,9 +136,9 @@ WAY_S = 2.0 / BRAKING_PER_S
 # The present tilt is that of so much later: a setpoint's way to the vehicle, and its motors.
 TILT_AHEAD_S = 0.05
 # Back off a surface, m/s for each metre of the clearance that is missing: a third as fast as the speed is braked.
-RETURN_PER_S = 2.5
-# Height and climb: critically damped at 4 rad/s, below what thrust and tilt share.
-HEIGHT_PER_S2, CLIMB_PER_S, MOST_CLIMB_M_S2 = 16.0, 8.0, 4.0
+RETURN_PER_S = BRAKING_PER_S / 3.0
+# Height and climb: critically damped, below what thrust and tilt share.
+HEIGHT_RAD_S, MOST_CLIMB_M_S2 = 4.0, 4.0
 # Largest tilt, 35 degrees: 6.9 m/s^2, with 22 % more thrust than hover's.
 MOST_TILT_RAD = 0.61
 # Thrust that the tilt leaves for the height, over what hovers at it; and while a turn is braked, for which PX4's mixer
@@ -162,7 +146,8 @@ MOST_TILT_RAD = 0.61
 HOVER_MARGIN, TURN_MARGIN = 1.1, 1.0 / (1.0 - 0.15)
 # So PX4's loop of the yaw rate has no more than this to brake; the rest of the turn is asked for.
 BRAKED_RAD_S = 1.0
-# The rotors keep turning: PX4's MPC_THR_MIN.
+# The rotors keep turning: PX4's MPC_THR_MIN. With less a vehicle does not fly, and the thrust's gain is a quotient of
+# small numbers.
 LEAST_THRUST = 0.12
 # The thrust gain is good enough to fly by after so long: 15 reports of the thrust at 30 Hz.
 THRUST_LEARNT_S = 0.5
@@ -223,8 +208,6 @@ CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
-# A receiver is needed no more once the reported velocity has agreed with its for so long: a swing only passes through.
-COMPARED_S = 0.5
 # The logistic function with this factor differs from the normal distribution's by less than 1 %.
 LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames

@@ -148,7 +148,7 @@ class Reflex:
         if not earlier and self._is_attitude_heard:
             force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
             averaging_s = self.config.estimate.imu_averaging_interval_s
-            self.newest.hypothesis = hypothesis_of(estimate, force_ned, averaging_s)
+            self.newest.hypothesis = hypothesis_of(estimate, force_ned, averaging_s, estimator.left_before_m_s)
         self.hits.append(self.newest)
         return self.newest
 

@@ -37,7 +37,7 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool =
     before it."""
     normal, (n, e, d) = Normal().with_direction(impulse_ned, reflex.IMPULSE_RAD), velocity_ned_m_s
     is_unclear = is_hidden or normal.direction_ned == ZERO
-    if not is_unclear or math.hypot(n, e, d) <= reflex.APPROACH_M_S:
+    if not is_unclear or math.hypot(n, e, d) <= reflex.SLOW_M_S:
         return normal
     back = Normal().with_direction((-n, -e, -d), reflex.APPROACH_RAD)
     return normal if is_from_behind(normal.direction_ned, back.direction_ned) else back

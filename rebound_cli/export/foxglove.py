@@ -150,7 +150,6 @@ def _hit(finding: Finding) -> Json:
         "is_collision": finding.is_collision,
         "kind": final.impact.kind.value,
         "evidence": first.impact.evidence.value,
-        "confidence": final.impact.confidence,
         "specific_force_frd_m_s2": first.impact.specific_force_frd_m_s2,
         "threshold_m_s2": finding.threshold_m_s2,
         "velocity_ned_m_s": first.velocity_ned_m_s,

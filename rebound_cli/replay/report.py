@@ -115,7 +115,7 @@ def impact_facts(finding: Finding, normal: Normal, seconds: Callable[[float], fl
         ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
         ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
         ("Normal", f"{bearing(normal.direction_ned)} ± {math.degrees(normal.error_rad):.0f}°"),
-        ("Taken for", f"{kind_text(finding)}, confidence {first.impact.confidence:.2f}"),
+        ("Taken for", kind_text(finding)),
     ]
 
 

@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -123,6 +124,8 @@ def test_velocities_reject_one_sample_whose_impulse_they_would_show(force_m_s2, 
         1_000_000, 996_000, 0.005 * force_m_s2, (1.0, 0.0, 0.0), force_m_s2, earlier, later_boot_us=1_004_000
     )
     assert hypothesis.is_rejected(heard, MotionHistory(), 0.03) is is_none
+    # And while an earlier hit is corrected, which may hide as much, they reject nothing
+    assert not replace(hypothesis, left_m_s=0.0025 * force_m_s2).is_rejected(heard, MotionHistory(), 0.03)
 
 
 @pytest.mark.parametrize(("shown_m_s", "is_none"), [(0.3, False), (0.2, True)])

@@ -54,7 +54,7 @@ class MotionEstimator:
     config: reflex.EstimateConfig
     before: InitVar["MotionEstimator | None"] = None  # of an earlier hit
     fits_models: bool = True  # the vehicle's estimate corrects itself as one of the bank's models
-    is_second: bool = field(init=False)  # the error of an earlier hit was still being corrected
+    left_before_m_s: float = 0.0  # what the vehicle's velocity still had wrong by an earlier hit
     hardest_m_s: float = field(init=False)  # speed of the hit, or of such an earlier one
     motion: MotionState = field(init=False)
     normal: Normal = field(init=False)  # by the contact's force
@@ -87,9 +87,10 @@ class MotionEstimator:
     _same: Lasting = field(default_factory=Lasting)  # for how long the reported velocity has been the measured one
 
     def __post_init__(self, before: "MotionEstimator | None") -> None:
-        self.hardest_m_s, self.is_second = math.hypot(*self.contact.velocity_ned_m_s), False
+        self.hardest_m_s = math.hypot(*self.contact.velocity_ned_m_s)
         if before is not None and not before.is_valid:
-            self.hardest_m_s, self.is_second = max(self.hardest_m_s, before.hardest_m_s), True
+            self.hardest_m_s = max(self.hardest_m_s, before.hardest_m_s)
+            self.left_before_m_s = before.left_m_s
         self.motion, self.pushed_boot_us, self._time_boot_us = self.start, self.hit_boot_us, self.hit_boot_us
         self.normal = Normal(self.contact.normal_ned, self.contact.normal_error_rad)
         self._begin()
@@ -154,6 +155,11 @@ class MotionEstimator:
         place, velocity = self.motion.position_ned_m, self.motion.velocity_ned_m_s
         place = plus(place, elapsed_s, plus(velocity, 0.5, faster_m_s))
         self.motion = MotionState(place, plus(velocity, 1.0, faster_m_s))
+
+    @property
+    def is_second(self) -> bool:
+        """Whether the error of an earlier hit was still being corrected."""
+        return self.left_before_m_s > 0.0
 
     @property
     def _new_m_s2(self) -> Vector3:
@@ -237,21 +243,21 @@ class MotionEstimator:
     def tilt_error_rad(self, time_us: int) -> float:
         """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
         begun."""
-        is_early = not self.is_second and time_us - self.hit_boot_us < reflex.UNCORRECTED_US
+        is_early = not self.is_second and time_us - self.hit_boot_us < numbers.SHOWN_US
         is_right = self.is_fully_measured or self.has_faded or is_early
         return 0.0 if is_right else min(numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s), reflex.TIPPED_RAD)
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
-        corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
-        What struck a vehicle that stood still may have done so at any speed."""
+        corrected: by what is left of it; until that is known as of an elastic one that was hidden whole, by the worst
+        model of an estimator. What struck a vehicle that stood still may have done so at any speed."""
         if self.is_valid:
             return 0.0
-        if self.hardest_m_s < reflex.APPROACH_M_S or self.is_measured_apart:
-            return self.left_m_s
+        left_m_s = self.left_m_s
+        if math.isfinite(left_m_s) or self.hardest_m_s < reflex.SLOW_M_S or self.is_measured_apart:
+            return left_m_s - SAME_M_S
         *earlier, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
-        swing_m_s = 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
-        return min(swing_m_s, self.left_m_s)
+        return 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
 
     @property
     def is_measured_apart(self) -> bool:
@@ -361,6 +367,7 @@ class MotionEstimator:
         # `spread_m_s` is the measured one's.
         is_same = math.hypot(*flat(self.velocity_error_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
         self._same.update(is_same, time_boot_us)
-        if self._same.lasts_us > 1e6 * reflex.COMPARED_S:
+        # A swing only passes through.
+        if self._same.lasts_us > numbers.CURRENT_US:
             self._has_agreed = True
             self._bank = FilterBank(self.motion, self.spread_m_s, ZERO, self._time_boot_us, self._summed_m_s)

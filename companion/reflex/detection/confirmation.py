@@ -31,6 +31,7 @@ class Hypothesis:
     away: Vector3  # its direction, local NED
     force_m_s2: float = 0.0  # the contact force per mass in the IMU sample
     earlier: ImuSample | None = None  # the one before; None where a velocity shows the hit
+    left_m_s: float = 0.0  # by how much the vehicle's velocity may be wrong by an earlier hit
     later_boot_us: int | None = None  # time of the one after, once it has come
 
     def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> bool:
@@ -42,7 +43,12 @@ class Hypothesis:
         return math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s) > MOTORS_RAD_S2 * elapsed_s
 
     def is_rejected(self, fixes: Sequence[VelocityFix], history: MotionHistory, position_noise_m: float) -> bool:
-        """Whether velocities show no impulse of this size, or positions no jump of the velocity."""
+        """Whether velocities show no impulse of this size, or positions no jump of the velocity.
+
+        While an earlier hit is corrected they may show as much by that.
+        """
+        if 0.5 * self.change_m_s <= self.left_m_s:
+            return False
         return self._is_unmoved(fixes) or (self.earlier is None and self._stays_in_place(history, position_noise_m))
 
     def _is_unmoved(self, fixes: Sequence[VelocityFix]) -> bool:
@@ -97,7 +103,9 @@ def _median(vectors: Sequence[Vector3]) -> Vector3:
     return (n, e, d)
 
 
-def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Hypothesis | None:
+def hypothesis_of(
+    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float, left_m_s: float
+) -> Hypothesis | None:
     """The hypothesis that remains to be confirmed; None where more than one message shows the hit already."""
     impact, size_m_s2 = estimate.impact, math.hypot(*force_ned_m_s2)
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
@@ -105,7 +113,7 @@ def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s
         return None
     away = plus(ZERO, 1.0 / size_m_s2, force_ned_m_s2)
     if impact.evidence is Evidence.VELOCITY_JUMP:
-        return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
+        return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away, left_m_s=left_m_s)
     if estimate.earlier is None:
         return None
-    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, estimate.earlier)
+    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, estimate.earlier, left_m_s)

@@ -107,7 +107,6 @@ class Impact:
     that the contact must have fallen into."""
     kind: ImpactKind = ImpactKind.UNKNOWN
     evidence: Evidence = Evidence.FORCE
-    confidence: float = 1.0  # the detector's own, 0 to 1
     is_shown_twice: bool = False  # by more than one message
     free_frd_m_s2: Vector3 | None = None  # what the accelerometer shows without a contact whose force may show yet
 

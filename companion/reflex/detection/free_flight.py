@@ -151,11 +151,11 @@ class ThrustGain:
     fraction_until_us: int = -1  # until when it counts; not at all where it is too small for a quotient
     full_m_s2: float = 0.0
     known_s: float = 0.0
-    most_m_s2: float = reflex.STRONGEST_M_S2  # largest upward specific force that thrust can explain
+    most_m_s2: float = math.inf  # largest upward specific force that thrust can explain
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction = fraction
-        self.fraction_until_us = time_us + CURRENT_US if fraction >= reflex.LEAST_FRACTION else -1
+        self.fraction_until_us = time_us + CURRENT_US if fraction >= reflex.LEAST_THRUST else -1
 
     def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
         """Take the specific force by thrust of one sample of a vehicle in free air.

@@ -123,7 +123,7 @@ class FusedState(DetectorState):
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves, but not fast."""
-        is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < reflex.APPROACH_M_S
+        is_slow = math.hypot(*self.velocity_ned_m_s or ZERO) < reflex.SLOW_M_S
         return is_slow and self.hovered_boot_us is not None and time_us - self.hovered_boot_us < CURRENT_US
 
 
@@ -132,7 +132,7 @@ class FusedDetector:
 
     name = "fused"
     losses: ClassVar[Mapping[MessageId, str]] = {
-        MessageId.ATTITUDE_TARGET: "a force from below counts only beyond 5 g",
+        MessageId.ATTITUDE_TARGET: "a force from below does not count",
         MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
     }
 
@@ -196,8 +196,7 @@ class FusedDetector:
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         # Noise hardly brings the sample before so near to its limit, too.
         is_twice = s.force_before[0] > 1.0 / reflex.CLEAR
-        sure, free = min(1.0, 0.5 * ratio), s.free_frd_m_s2
-        impact = Impact(now_us, free_until_us, force, confidence=sure, is_shown_twice=is_twice, free_frd_m_s2=free)
+        impact = Impact(now_us, free_until_us, force, is_shown_twice=is_twice, free_frd_m_s2=s.free_frd_m_s2)
         if s.phase is Phase.OFF:
             # A force that stays is no crash: the vehicle lies on its back, or its sensor is upside down.
             return None if is_learnt else self._unwatched(s, situation, motion, impact)
@@ -216,7 +215,6 @@ class FusedDetector:
             free_until_us,
             ned_to_body(motion.strapdown.valid_wxyz, push),
             evidence=Evidence.RATE_JUMP,
-            confidence=min(1.0, 0.5 * (s.turn.value / s.turn.limit)),
             is_shown_twice=True,
             free_frd_m_s2=s.free_frd_m_s2,
         )
@@ -325,12 +323,5 @@ class FusedDetector:
         over_s = max(now_us - free_until_us, 1) * 1e-6
         force = plus(ZERO, size / over_s, both or unit(ned_to_body(strapdown.valid_wxyz, step)))
         s.velocity_ned_m_s = minus(v, step)
-        impact = Impact(
-            now_us,
-            free_until_us,
-            force,
-            evidence=Evidence.VELOCITY_JUMP,
-            confidence=min(1.0, 0.5 * size / least),
-            is_shown_twice=is_weak,
-        )
+        impact = Impact(now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, is_shown_twice=is_weak)
         return self._fire(s, situation, motion, impact)

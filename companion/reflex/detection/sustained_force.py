@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import shapely
 
 from companion.messages import AttitudeTarget, LocalPosition, Vector3
-from companion.motion.config import GATE, GRAVITY_M_S2, KEPT_US
+from companion.motion.config import GATE, GRAVITY_M_S2, KEPT_US, SAME_M_S
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards, unit
@@ -123,13 +123,13 @@ class SustainedForceMonitor:
         along_m_s, across = split(self.velocity_m_s, pushes)
         across_m_s = math.hypot(*across)
         # One that slides moves along the force, too: friction and wind turn the force by up to 60 degrees.
-        most_back_m_s = max(reflex.STEADY_M_S, min(across_m_s, 2.0 * reflex.STEADY_M_S))
-        most_on_m_s = max(reflex.STEADY_M_S, min(2.0 * across_m_s, reflex.FREE_M_S))
+        most_back_m_s = max(SAME_M_S, min(across_m_s, 2.0 * SAME_M_S))
+        most_on_m_s = max(SAME_M_S, min(2.0 * across_m_s, reflex.SLOW_M_S))
         is_free = along_m_s >= most_on_m_s or along_m_s <= -most_back_m_s
         if is_there or is_free:
-            share = 1.0 if abs(along_m_s) > reflex.FREE_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
+            share = 1.0 if abs(along_m_s) > reflex.SLOW_M_S else elapsed_s / (reflex.FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
-        if is_free or force_m_s2 < 0.5 * reflex.HELD_M_S2 or along(short, pushes) <= 0.0:
+        if is_free or force_m_s2 < reflex.PRESSES_M_S2 or along(short, pushes) <= 0.0:
             self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         if force_m_s2 < reflex.HELD_M_S2 or now_us - self.pushed_since_us < reflex.FOLLOWS_US:
@@ -142,7 +142,7 @@ class SustainedForceMonitor:
         """
         setpoints, fixes, now_us = self.setpoints, strapdown.fixes, strapdown.time_boot_us
         since_us = now_us - self.error_us
-        (n, e, _), half_m_s2 = self.missing_m_s2, 0.5 * reflex.HELD_M_S2
+        (n, e, _), half_m_s2 = self.missing_m_s2, reflex.PRESSES_M_S2
         # Where no force is missing, it is only learnt how well the vehicle follows.
         if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
             return None
@@ -167,7 +167,7 @@ class SustainedForceMonitor:
         if beyond <= limit or known_s < reflex.LEARNT_S:
             return None
         force_m_s2 = along(self.missing_m_s2, leant)
-        is_free = along(self.velocity_m_s, leant) > reflex.FREE_M_S
+        is_free = along(self.velocity_m_s, leant) > reflex.SLOW_M_S
         return None if is_free or force_m_s2 < half_m_s2 else plus(ZERO, force_m_s2, leant)
 
     def _smooth(self, sample: LocalPosition, strapdown: Strapdown) -> float:

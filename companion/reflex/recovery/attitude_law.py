@@ -7,7 +7,7 @@ TILT_AHEAD_S later, horizontally
 
 v_o is the slowest velocity that leads off each surface by RETURN_PER_S times what will be missing of its clearance
 when the thrust has turned, LEAD_S later.
-Vertically a_d = HEIGHT_PER_S2 (d_0 - d) - CLIMB_PER_S v_d. What PX4 makes of it, held until it notices that nothing
+Vertically a_d = h^2 (d_0 - d) - 2 h v_d, h = HEIGHT_RAD_S. What PX4 makes of it, held until it notices that nothing
 follows, stays off every half-space (`held_off`). The thrust's axis is along a - g; its size carries the vehicle at the
 present tilt.
 """
@@ -66,7 +66,7 @@ def wanted(belief: Belief, surfaces: Sequence[Surface], down_m: float) -> Vector
     off = projected(ZERO, near)
     short, moves = minus(off, velocity), plus(belief.tilt_m_s2, 1.0, external)
     n, e, _ = minus(plus(plus(ZERO, -1.0, external), reflex.BRAKING_PER_S, short), moves)
-    climbs = reflex.HEIGHT_PER_S2 * (down_m - place[2]) - reflex.CLIMB_PER_S * v_d
+    climbs = reflex.HEIGHT_RAD_S * (reflex.HEIGHT_RAD_S * (down_m - place[2]) - 2.0 * v_d)
     return (n, e, min(max(climbs, -reflex.MOST_CLIMB_M_S2), reflex.MOST_CLIMB_M_S2))
 
 

@@ -268,10 +268,11 @@ def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(
 
 @pytest.mark.parametrize(
     ("speed", "later_s", "left_m_s", "hits"),
-    [(0.0, 1.5, math.inf, 1), (0.0, 1.5, 0.9, 1), (0.0, 1.5, 0.6, 2), (2.0, 0.3, math.inf, 1), (2.0, 0.3, 0.2, 2)],
+    [(0.0, 1.5, math.inf, 1), (0.0, 1.5, 0.9, 1), (0.0, 1.5, 0.6, 2), (2.0, 0.3, math.inf, 1), (2.0, 0.3, 0.2, 2)]
+    + [(2.0, 1.5, math.inf, 2), (2.0, 1.5, 0.95, 1)],
 )
 def test_a_jump_beyond_what_is_left_of_a_hit_is_another(speed, later_s, left_m_s, hits):
-    """What struck a hovering vehicle may have done so at any speed; once its error is known, it no longer may."""
+    """What struck a hovering vehicle may have done so at any speed; once its error is known, that counts alone."""
     impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 0.8 * (since_s >= later_s), speed, left_m_s)
     assert len(impacts) == hits
 
@@ -298,7 +299,7 @@ def test_a_turn_shows_no_direction_and_needs_no_other_evidence(push, normal, err
     assert hit.normal.error_rad == APPROACH_RAD and known.time_boot_us == hit.time_boot_us
     assert known.normal.direction_ned == pytest.approx(normal, abs=0.1)
     assert known.normal.error_rad == error_rad and not known.is_fully_measured
-    assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005) is None
+    assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005, 0.0) is None
 
 
 def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():

@@ -8,12 +8,12 @@ import pytest
 
 from companion.flight.context import Inputs
 from companion.messages import Attitude, LocalPosition
-from companion.motion.config import CURRENT_US, GRAVITY_M_S2, SAME_M_S, TILT_RAD_PER_M_S
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, SAME_M_S, SHOWN_US, TILT_RAD_PER_M_S
 from companion.motion.rotation import yaw_rad
 from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, minus
 from companion.reflex.belief.motion_estimator import MotionEstimator
-from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, UNCORRECTED_US, EstimateConfig
+from companion.reflex.config import CORRECTED_US, TILT_PER_S, TIPPED_RAD, EstimateConfig
 from companion.reflex.surface import Contact, MotionState
 from tests.companion.flight.test_recovering import AT, HIT_US, SOUTH, flight_with, recover_in
 
@@ -37,7 +37,7 @@ def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_co
     contact = Contact(AT, (1.0, 0.0, 0.0), SOUTH, 0.2)
     found = MotionEstimator(contact, next_us, contact.rebound(0.45), EstimateConfig(), first)
     # Then the tilt may be wrong by the harder of both, at once; else by its own, once the correction can have begun
-    tilts_rad = [found.tilt_error_rad(next_us + since_us) for since_us in (UNCORRECTED_US - 1, UNCORRECTED_US)]
+    tilts_rad = [found.tilt_error_rad(next_us + since_us) for since_us in (SHOWN_US - 1, SHOWN_US)]
     assert tilts_rad == pytest.approx([4.0 * TILT_RAD_PER_M_S] * 2 if is_second else [0.0, 2.0 * TILT_RAD_PER_M_S])
     # And a contact that was measured whole leaves the estimate valid after none
     found.note_contact(True, next_us, found.normal, 0.0)
@@ -45,7 +45,7 @@ def test_what_an_earlier_hit_has_hidden_counts_on_in_the_next_one_until_it_is_co
     found.imu(Strapdown(time_boot_us=next_us + CORRECTED_US + 1))
     assert found.is_valid and not found.has_faded
     # However hard it was, a vehicle's level is no further off than where it tips over
-    assert reckoned((20.0, 0.0, 0.0)).tilt_error_rad(HIT_US + UNCORRECTED_US) == TIPPED_RAD
+    assert reckoned((20.0, 0.0, 0.0)).tilt_error_rad(HIT_US + SHOWN_US) == TIPPED_RAD
 
 
 def missing(since_s, late_s, rad_s, damping):

@@ -168,12 +168,12 @@ def test_what_has_left_a_wall_is_led_off_it_by_where_it_will_be_when_its_thrust_
         belief = Belief(plus(HERE, off_m, SOUTH), plus(ZERO, speed_m_s, SOUTH), spread_m_s)
         return wanted(belief, [WALL], HERE[2])[0]
 
-    assert asked_m_s2(0.1, 0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 - 0.15 * 0.6) - 0.6))
-    assert asked_m_s2(0.1, -0.6) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 + 0.15 * 0.6) + 0.6))
+    assert asked_m_s2(0.1, 0.6) == pytest.approx(-7.0 * (7.0 / 3.0 * (0.35 - 0.1 - 0.15 * 0.6) - 0.6))
+    assert asked_m_s2(0.1, -0.6) == pytest.approx(-7.0 * (7.0 / 3.0 * (0.35 - 0.1 + 0.15 * 0.6) + 0.6))
     # and of a speed that is not certain by what is
-    assert asked_m_s2(0.1, 0.6, 0.1) == pytest.approx(-7.0 * (2.5 * (0.35 - 0.1 - 0.15 * 0.5) - 0.5))
+    assert asked_m_s2(0.1, 0.6, 0.1) == pytest.approx(-7.0 * (7.0 / 3.0 * (0.35 - 0.1 - 0.15 * 0.5) - 0.5))
     # but not by more than it has left: what pushes it goes along with it
-    assert asked_m_s2(0.0, 0.6) == pytest.approx(-7.0 * (2.5 * 0.35 - 0.6))
+    assert asked_m_s2(0.0, 0.6) == pytest.approx(-7.0 * (7.0 / 3.0 * 0.35 - 0.6))
 
 
 def test_near_a_surface_only_what_is_certain_of_the_speed_away_from_it_is_braked():
