@@ -249,15 +249,15 @@ class MotionEstimator:
 
     def correction_m_s(self, times_us: Sequence[int]) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
-        corrected: by what is left of it; until that is known as of an elastic one that was hidden whole, by the worst
-        model of an estimator. What struck a vehicle that stood still may have done so at any speed."""
+        corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
+        What struck a vehicle that stood still may have done so at any speed."""
         if self.is_valid:
             return 0.0
-        left_m_s = self.left_m_s
-        if math.isfinite(left_m_s) or self.hardest_m_s < reflex.SLOW_M_S or self.is_measured_apart:
-            return left_m_s - SAME_M_S
+        if self.hardest_m_s < reflex.SLOW_M_S or self.is_measured_apart:
+            return self.left_m_s
         *earlier, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
-        return 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
+        swing_m_s = 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
+        return min(swing_m_s, self.left_m_s)
 
     @property
     def is_measured_apart(self) -> bool:
