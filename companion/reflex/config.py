@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from companion.motion.config import GRAVITY_M_S2
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the specific force's noise
@@ -44,6 +45,9 @@ CLEAR = 1.3
 JUMP = 2.4
 
 # --- thrust
+# A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
+# the maximum of the strongest vehicle.
+STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
 # Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 

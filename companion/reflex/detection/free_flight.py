@@ -151,7 +151,7 @@ class ThrustGain:
     fraction_until_us: int = -1  # until when it counts; not at all where it is too small for a quotient
     full_m_s2: float = 0.0
     known_s: float = 0.0
-    most_m_s2: float = math.inf  # largest upward specific force that thrust can explain
+    most_m_s2: float = reflex.STRONGEST_M_S2  # largest upward specific force that thrust can explain
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction = fraction

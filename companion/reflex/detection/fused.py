@@ -132,7 +132,7 @@ class FusedDetector:
 
     name = "fused"
     losses: ClassVar[Mapping[MessageId, str]] = {
-        MessageId.ATTITUDE_TARGET: "a force from below does not count",
+        MessageId.ATTITUDE_TARGET: "a force from below counts only beyond 5 g",
         MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
     }
 
