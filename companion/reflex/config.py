@@ -91,18 +91,19 @@ IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
 # A slower vehicle may have been struck from any side, be pushed by a hand, or slide along a surface. One that is faster
 # flies, and drag and wind change with its speed.
 SLOW_M_S = 0.5
-# Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
-# behind, and the direction of flight says nothing of it.
-FROM_BEHIND = -0.5
+# Cosine of 120 degrees: directions that are further apart are opposite. No obstacle at rest pushes in the direction of
+# flight: what does came from behind, and that direction says nothing of it. Surfaces of opposite normals face each
+# other, as in a corridor; walls of a corner are at 0.
+OPPOSITE_COSINE = -0.5
 # Nothing is known of a direction, rad.
 UNKNOWN_RAD = 0.5 * math.pi
 
 # --- validity of the vehicle's velocity
 # By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5 per second, bench/notes/px4.md).
 CORRECTED_US = 4_500_000
-# What is known of a hit's errors goes with every position, until it is taken away between these times: by GPS a real
-# PX4's velocity was wrong by 0.4 m/s 10 s after a hit at 3 m/s.
-FADES_FROM_US, FADED_US = 6_000_000, 12_000_000
+# What is known of a hit's errors goes with every position until then, and from half of it on less and less: by GPS a
+# real PX4's velocity was wrong by 0.4 m/s 10 s after a hit at 3 m/s.
+FADED_US = 12_000_000
 
 # --- a sustained force
 # Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
@@ -187,9 +188,6 @@ STILL_M_S2, STILL_RAD_S, LYING_SHARE = 1.0, 0.3, 0.05
 CARRIED_SHARE = 0.5
 
 # --- half-spaces
-# Cosine between two normals. Below it the surfaces face each other, as in a corridor: the goal is then no further from
-# one than the middle between them. Walls of a corner are at 0.
-FACING_COSINE = -0.5
 # Standard deviation of a surface's position and of the hit's: arms fold, and position estimates drift.
 PLACE_SPREAD_M = 0.1
 # The vehicle's own position is free. A surface that it is behind by two of them is in a wrong place, and is ignored.

@@ -191,7 +191,7 @@ class Reflex:
         if newest is None or not newest.estimator.has_converged:
             return 0.0
         left_us = newest.estimator.hit_boot_us + numbers.FADED_US - time_boot_us
-        share = left_us / (numbers.FADED_US - numbers.FADES_FROM_US)
+        share = 2.0 * left_us / numbers.FADED_US
         return 1.0 if newest.estimator.is_measured_apart else min(max(share, 0.0), 1.0)
 
     def place_ned_m(self, reported: LocalPosition) -> Vector3:

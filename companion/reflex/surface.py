@@ -45,7 +45,7 @@ def normal_of(impulse_ned: Vector3, velocity_ned_m_s: Vector3, is_hidden: bool =
 
 def is_from_behind(pushed_ned: Vector3, back_ned: Vector3) -> bool:
     """Whether a push is along the flight, and not back to where the vehicle came from; unit vectors."""
-    return along(pushed_ned, back_ned) < reflex.FROM_BEHIND
+    return along(pushed_ned, back_ned) < reflex.OPPOSITE_COSINE
 
 
 def with_change(normal: Normal, before_ned_m_s: Vector3, after_ned_m_s: Vector3, error_m_s: float) -> Normal:

@@ -257,7 +257,7 @@ class Collision:
             room_m, most_m = other.off_m(contact.position_ned_m), other.distance_m
             if room_m < -reflex.BEHIND_M:
                 continue
-            if along(contact.normal_ned, other.normal_ned) < reflex.FACING_COSINE:
+            if along(contact.normal_ned, other.normal_ned) < reflex.OPPOSITE_COSINE:
                 most_m = min(most_m, 0.5 * max(0.0, room_m))
                 found[0] = replace(found[0], distance_m=min(found[0].distance_m, most_m))
             found.append(replace(other, distance_m=most_m))
