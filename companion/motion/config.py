@@ -17,6 +17,7 @@ CURRENT_US = 500_000
 # The vehicle's estimate shows a hit by this time: all but the longest contacts are over (0.12 s at 1 m/s), it is 20 to
 # 40 ms late, and a filter's switching makes it swing. Then it is decided: a tilt of 17 degrees for this time moves a
 # vehicle by 3 cm. Velocities before the hit are averaged over the same time: the shorter, the smaller are slow errors.
+# Not before it, but for 10 ms, does PX4's begin to correct what was hidden (bench/notes/px4.md).
 SHOWN_US = 150_000
 # A velocity that differs by less does not differ: four times the noise of a good estimate, which reaches 0.1 m/s now
 # and then. An estimate has converged when its known error stays below that.

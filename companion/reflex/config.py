@@ -75,6 +75,8 @@ ACROSS_THRUST = 1.0 / 3.0
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
+# The feet are 0.1 m below the centre: a vehicle at this height stands on the ground, or scrapes along it.
+SCRAPING_M = 0.1
 
 # --- the contact's force
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range

@@ -367,7 +367,7 @@ class MotionEstimator:
         # `spread_m_s` is the measured one's.
         is_same = math.hypot(*flat(self.velocity_error_m_s)) <= math.hypot(SAME_M_S, self.spread_m_s)
         self._same.update(is_same, time_boot_us)
-        # A swing only passes through.
+        # For as long as a receiver's velocity counts: a swing only passes through.
         if self._same.lasts_us > numbers.CURRENT_US:
             self._has_agreed = True
             self._bank = FilterBank(self.motion, self.spread_m_s, ZERO, self._time_boot_us, self._summed_m_s)

@@ -9,7 +9,7 @@ from companion.motion.config import GRAVITY_M_S2, SAME_M_S, SHOWN_US
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, tilt_rad
 from companion.motion.vector import ZERO
-from companion.reflex.config import GROUND_M, LOW_M, STEEP
+from companion.reflex.config import GROUND_M, SCRAPING_M, STEEP
 from companion.reflex.detection.detector import Impact, ImpactKind, Motion, Situation
 
 # The speed of a fall from half of the height in which the ground may be: 3.1 m/s. PX4 lands at up to 1.5 m/s
@@ -78,7 +78,7 @@ class Touch:
     def has_landed(self) -> bool:
         """A vehicle on its way down meets the ground; one that is as low as its feet stands on it or scrapes along."""
         height_m = self.situation.height_m
-        is_as_low_as_feet = height_m is not None and height_m < LOW_M
+        is_as_low_as_feet = height_m is not None and height_m < SCRAPING_M
         return is_as_low_as_feet or (self.situation.descent_commanded and (self.meets_ground or self.is_pushed_up))
 
 

@@ -142,9 +142,9 @@ class SustainedForceMonitor:
         """
         setpoints, fixes, now_us = self.setpoints, strapdown.fixes, strapdown.time_boot_us
         since_us = now_us - self.error_us
-        (n, e, _), half_m_s2 = self.missing_m_s2, reflex.PRESSES_M_S2
+        n, e, _ = self.missing_m_s2
         # Where no force is missing, it is only learnt how well the vehicle follows.
-        if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < half_m_s2:
+        if since_us < reflex.FOLLOWS_US and math.hypot(n, e) < reflex.PRESSES_M_S2:
             return None
         # Some may be lost, and those of before a stall say nothing of the attitude after it.
         if not setpoints or now_us - setpoints[-1][0] >= reflex.LONGEST_STEP_US:
@@ -168,7 +168,7 @@ class SustainedForceMonitor:
             return None
         force_m_s2 = along(self.missing_m_s2, leant)
         is_free = along(self.velocity_m_s, leant) > reflex.SLOW_M_S
-        return None if is_free or force_m_s2 < half_m_s2 else plus(ZERO, force_m_s2, leant)
+        return None if is_free or force_m_s2 < reflex.PRESSES_M_S2 else plus(ZERO, force_m_s2, leant)
 
     def _smooth(self, sample: LocalPosition, strapdown: Strapdown) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""

@@ -369,10 +369,12 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     assert len(reflex.hits) == 1
     assert reflex.hits[0].estimator.start.velocity_ned_m_s[0] == pytest.approx(-0.2 * 2.0, abs=0.05)
     assert bool(rejected) is (force_m_s2 == 0.0)
-    # And a second one that is taken back leaves what is known of the first, of which nothing is left at last
+    # And velocities that it may have spoilt do not reject the next one
     source, first = reflex.monitor.estimator, reflex.hits[0]
-    first.is_over = True
-    reflex.begin(source.begin(Impact(us, us - INTERVAL_US, (-40.0, 0.0, 0.0), ImpactKind.WALL)), room, us)
+    first.is_over, may_be_wrong_m_s = True, first.estimator.left_m_s
+    second = reflex.begin(source.begin(Impact(us, us - INTERVAL_US, (-40.0, 0.0, 0.0), ImpactKind.WALL)), room, us)
+    assert second.hypothesis is not None and second.hypothesis.left_m_s == may_be_wrong_m_s > 0.0
+    # which, taken back, leaves what is known of the first, of which nothing is left at last
     reflex.take_back()
     assert reflex.newest is first and source.followed == [first.estimator] and not source.is_valid
     reflex.take_back()
