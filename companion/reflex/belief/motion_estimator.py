@@ -247,17 +247,17 @@ class MotionEstimator:
         is_right = self.is_fully_measured or self.has_faded or is_early
         return 0.0 if is_right else min(numbers.TILT_RAD_PER_M_S * (1.0 + self.hardest_m_s), reflex.TIPPED_RAD)
 
-    def correction_m_s(self, times_us: Sequence[int]) -> float:
+    def correction_m_s(self, times_us: Sequence[int], left_m_s: float) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
-        corrected: by what is left of it, or an elastic one that was hidden whole, by the worst model of an estimator.
+        corrected: by what was left of it before, or an elastic one that was hidden whole, by the worst model of an estimator.
         What struck a vehicle that stood still may have done so at any speed."""
         if self.is_valid:
             return 0.0
         if self.hardest_m_s < reflex.SLOW_M_S or self.is_measured_apart:
-            return self.left_m_s
+            return left_m_s
         *earlier, newest = (error_response(1e-6 * (each - self.hit_boot_us))[0] for each in times_us)
         swing_m_s = 2.0 * self.hardest_m_s * float(np.abs(newest - sum(earlier) / len(earlier)).max())
-        return min(swing_m_s, self.left_m_s)
+        return min(swing_m_s, left_m_s)
 
     @property
     def is_measured_apart(self) -> bool:

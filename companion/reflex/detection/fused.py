@@ -57,6 +57,7 @@ class FusedState(DetectorState):
     vertical_threshold_m_s2: float = 0.0  # beyond the force that propellers can make
     floor: ForceNoise = field(default_factory=ForceNoise)
     jump: VelocityJump = field(default_factory=VelocityJump)
+    left_m_s: float = 0.0  # by how much the last velocity may have been wrong by an earlier hit
     velocity_ned_m_s: Vector3 | None = None
     moved_boot_us: int = 0
     hovered_boot_us: int | None = None
@@ -291,6 +292,8 @@ class FusedDetector:
         if not strapdown.has_new_fix or motion.hides_clipping:
             return None
         s.velocity.value, s.velocity.limit = 0.0, math.inf
+        # As it was known before this velocity, which the next hit has changed, too.
+        left_m_s, s.left_m_s = s.left_m_s, motion.left_m_s
         if time_us - s.last_loud_boot_us < SHOWN_US:
             jump.since_us = time_us
             return None
@@ -305,7 +308,7 @@ class FusedDetector:
         caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
         least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s) + unseen_m_s
         size = math.hypot(*step)
-        corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us)
+        corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us, left_m_s)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s
         ratio = s.velocity.value / s.velocity.limit
         felt = max(s.force[0], s.force_before[0])

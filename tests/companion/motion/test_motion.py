@@ -251,7 +251,7 @@ def test_an_error_that_no_model_has_is_followed_as_it_fades():
         north_m = newest.position_ned_m[0] - found.position_error_m[0]
         assert found.motion.position_ned_m[0] == pytest.approx(north_m, abs=0.05)
         assert 0.0 < found.spread_m_s < 0.2, "the velocity is the receiver's, and as good"
-        jumps_m_s = found.correction_m_s([air.now_us - 60_000, air.now_us - 40_000, air.now_us])
+        jumps_m_s = found.correction_m_s([air.now_us - 60_000, air.now_us - 40_000, air.now_us], found.left_m_s)
         assert jumps_m_s == found.left_m_s and not found.is_valid, "for as long as that takes"
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.1)
 

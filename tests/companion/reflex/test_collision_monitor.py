@@ -69,7 +69,7 @@ class Watch:
             if t % 32_000 == 0:
                 n, e, d = velocity(t)
                 told = (n + HAIR_M_S * (t // 32_000 % 2), e, d)
-                samples += [Odometry(t, place(t), told, 0), LocalPosition(t, place(t), told)]
+                samples += [LocalPosition(t, place(t), told), Odometry(t, place(t), told, 0)]
                 wxyz = attitude(t)
                 samples += [] if wxyz is None else [Attitude(t, wxyz, rates(t))]
             impacts, notices = advance(self.monitor, samples, situation, t)
@@ -274,6 +274,13 @@ def test_a_jump_beyond_what_is_left_of_a_hit_is_another(speed, later_s, left_m_s
     """What struck a hovering vehicle may have done so at any speed; once its error is known, it no longer may."""
     impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 0.8 * (since_s >= later_s), speed, left_m_s)
     assert len(impacts) == hits
+
+
+def test_what_the_next_hit_changes_is_not_taken_for_what_is_left_of_the_last():
+    """A belief that has heard the next hit's first velocity takes a part of it for an error of the estimate."""
+    left_m_s = property(lambda found: 0.6 + math.hypot(*found.velocity_error_m_s))
+    impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 0.9 * (since_s >= 1.5), left_m_s=left_m_s)
+    assert len(impacts) == 2
 
 
 @pytest.mark.parametrize(("left_m_s", "hits"), [(math.inf, 1), (0.3, 2)])
