@@ -57,11 +57,6 @@ COMPARED = 3
 # Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
 # between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
-# samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
-# deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
-# STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
-SHAKEN_S, STAMP_S = 0.15, 0.008
 
 # --- rate jumps
 # A jump is one from the mean of the rate over this time: as long as the shortest contact of spring arms.

@@ -75,7 +75,7 @@ class MotionEstimator:
     _expected_within_m_s: float = field(init=False)  # standard deviation of the expected motion's velocity
     _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = ZERO  # the accelerometer's integral, as at the vehicle's centre
-    _turned_from: tuple[Quaternion, Vector3] | None = None  # attitude and rates at the last sample of more than 1 g
+    _turned_from: tuple[Quaternion, Vector3] | None = None  # attitude and rates at the contact's last sample of 1 g
     _shown_m_s: Vector3 = ZERO  # the integral up to that sample, and from there on as at the accelerometer
     _smoothed_m_s2: Vector3 = ZERO  # what it shows, low-pass filtered
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
@@ -121,7 +121,7 @@ class MotionEstimator:
             self._begin(impulse_m_s)
 
     def imu(self, strapdown: Strapdown) -> None:
-        """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
+        """Integrate the newest sample. More than 1 g beside the thrust is the contact, which `start` contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
         self._time_boot_us = time_us
         self.level_m_s2, self._sinks_m_s2 = strapdown.level_acceleration_m_s2, strapdown.sinks_m_s2
@@ -129,7 +129,8 @@ class MotionEstimator:
             return
         force = body_to_ned(strapdown.valid_wxyz, strapdown.centre_frd_m_s2)
         pushed = plus(force, GRAVITY_M_S2, (0.0, 0.0, 1.0))
-        is_free, last = math.hypot(*pushed) < GRAVITY_M_S2, self._summed_m_s
+        x, y, z = strapdown.centre_frd_m_s2  # thrust has no part in x and y, nor in a positive z
+        is_free, last = math.hypot(x, y, max(z, 0.0)) < GRAVITY_M_S2, self._summed_m_s
         weight = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
         self._smoothed_m_s2 = towards(self._smoothed_m_s2, pushed if is_free else ZERO, weight)
         if not is_free or self._turned_from is None:
@@ -249,8 +250,8 @@ class MotionEstimator:
 
     def correction_m_s(self, times_us: Sequence[int], left_m_s: float) -> float:
         """By how much the newest of these velocities may differ from the mean of the others, because the hit is being
-        corrected: by what was left of it before, or an elastic one that was hidden whole, by the worst model of an estimator.
-        What struck a vehicle that stood still may have done so at any speed."""
+        corrected: by what was left of it before, or an elastic one that was hidden whole, by the worst model of an
+        estimator. What struck a vehicle that stood still may have done so at any speed."""
         if self.is_valid:
             return 0.0
         if self.hardest_m_s < reflex.SLOW_M_S or self.is_measured_apart:

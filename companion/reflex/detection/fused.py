@@ -167,6 +167,8 @@ class FusedDetector:
             off = ON_THE_GROUND  # feet that stand on it shake and push
         free_until_us = before_us = s.last_sample_boot_us
         earlier_us, s.last_sample_boot_us = before_us - s.turn.over_us, now_us
+        # What a turn that began with the last sample made of it shows in the rates now.
+        s.force_before = (s.force[0] / (1.0 + motion.lever.unseen_m_s2 / s.side.limit), s.force[1])
         s.side.value, s.side.limit, is_of_two = s.side_force(config, motion.lever)
         s.vertical.value, s.vertical.limit = max(f[2], -f[2] - s.thrust.most_m_s2), s.vertical_threshold_m_s2
         sideways, upright = s.side.value / s.side.limit, s.vertical.value / s.vertical.limit
@@ -174,7 +176,7 @@ class FusedDetector:
         if is_of_two:
             free_until_us = earlier_us
         ratio = max(sideways, upright)
-        s.force_before, s.force = s.force, (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
+        s.force = (ratio, towards(f, s.last_frd_m_s2, 0.5) if is_of_two else f)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
@@ -300,13 +302,9 @@ class FusedDetector:
         step = jump.step_m_s(strapdown.fixes)
         if step is None:
             return None
-        # Vibration between the samples, of whose newest interval an averaging window covers a part.
-        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
-        unseen_share = max(0.0, 1.0 - self._averaging_us / max(s.turn.over_us, 1))
-        unseen_m_s = shaking_m_s2 * (reflex.SHAKEN_S * unseen_share + reflex.STAMP_S)
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
-        least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s) + unseen_m_s
+        least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s)
         size = math.hypot(*step)
         corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us, left_m_s)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s

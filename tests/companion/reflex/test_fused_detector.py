@@ -139,6 +139,21 @@ def test_of_what_no_sample_showed_the_velocity_that_it_leaves_tells(change_m_s, 
     assert [impact.evidence for impact in impacts] == [Evidence.VELOCITY_JUMP] * hits
 
 
+@pytest.mark.parametrize(("jump_m_s", "turns_rad_s2", "hits"), [(-0.1, 0.0, 1), (0.1, 0.0, 0), (-0.1, 60.0, 0)])
+def test_a_weak_force_and_a_weak_jump_are_a_hit_together_but_for_the_force_that_begins_a_turn(
+    jump_m_s, turns_rad_s2, hits
+):
+    """A sensor beside the centre, where no turn has shown it yet: the next rates tell what the force was."""
+    flight = Flight(
+        lambda t: (-1.5 * (3_015_000 < t <= 3_020_000), 0.0, 0.0),
+        imu_every_us=20_000,
+        jump=(3_021_000, (jump_m_s, 0.0, 0.0), 0),
+        rates=lambda t: (0.0, 1e-6 * turns_rad_s2 * min(max(t - 3_020_000, 0), 40_000), 0.0),
+        velocity=(1.0, 0.0, 0.0),
+    )
+    assert len(flight.fly(until_us=3_070_000)) == hits
+
+
 # --- rate jump ----------------------------------------------------------------------------------------------
 
 

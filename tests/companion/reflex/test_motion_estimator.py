@@ -166,6 +166,24 @@ def test_the_velocity_after_the_contact_is_the_reported_one_less_what_the_thrust
         assert found.after_error_m_s < math.inf
 
 
+@pytest.mark.parametrize(
+    ("force_frd_m_s2", "faster_m_s2"),
+    [((0.0, 0.0, -21.5), 15.2), ((-12.0, 0.0, -9.8), 0.0), ((0.0, 12.0, -21.5), 0.0), ((0.0, 0.0, 12.0), 0.0)],
+    ids=["thrust", "wall", "wall beside it", "ceiling"],
+)
+def test_a_thrust_of_twice_the_weight_moves_a_vehicle_and_a_contact_of_its_weight_has_done_so(
+    force_frd_m_s2, faster_m_s2
+):
+    # Given a vehicle that leans north by 45 degrees after a hit, before the first report
+    found, strapdown = reckoned(), Strapdown()
+    was_m_s, leans_rad = found.motion.velocity_ned_m_s[0], math.radians(-45.0)
+    strapdown.attitude(HIT_US, (math.cos(0.5 * leans_rad), 0.0, math.sin(0.5 * leans_rad), 0.0))
+    for tick in range(51):
+        strapdown.imu(HIT_US + 4_000 * tick, force_frd_m_s2, ZERO)
+        found.imu(strapdown)
+    assert found.motion.velocity_ned_m_s[0] - was_m_s == pytest.approx(0.2 * faster_m_s2, abs=0.1)
+
+
 def test_the_height_is_the_reported_one_while_a_hit_is_corrected_and_after_it():
     # Given a vehicle whose velocity is wrong downwards, too, and whose heights stand
     found, strapdown = reckoned((3.0, 0.0, 1.0)), Strapdown()
@@ -231,7 +249,7 @@ def test_a_climb_that_a_wrong_tilt_makes_of_a_lean_is_no_motion_of_a_copter():
     found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.8, fits=False), Strapdown()
     strapdown.sinks_m_s2, climbs_m_s, climbed_m = 0.5, 0.0, 0.0
     for tick in range(1, 250):
-        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        strapdown.imu(HIT_US + 4_000 * tick, (0.0, 0.0, -GRAVITY_M_S2), ZERO)
         found.imu(strapdown)
         climbs_m_s += 0.004 * (0.5 - PX4[1] ** 2 * climbed_m)
         climbed_m += 0.004 * (climbs_m_s - 2.0 * PX4[2] * PX4[1] * climbed_m)
