@@ -7,7 +7,7 @@ from companion.flight.handlers.ending import DISARM_NEWS_US
 from companion.flight.states import Trigger
 from companion.messages import DISARM, DISARM_BY_FORCE
 from companion.motion.rotation import tilt_rad
-from companion.reflex.config import LIES_US, LOW_M, LOW_US, TIPPED_US
+from companion.reflex.config import LIES_US, LOW_US, TIPPED_US
 
 
 def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition | None:
@@ -41,8 +41,11 @@ def crashed(flight: FlightContext, goes_down: bool, now_us: int) -> Transition |
 
 
 def _is_to_be_higher(flight: FlightContext) -> bool:
-    """Whether it is asked for more height than the floor's; where nobody knows, it may be."""
-    return flight.target is None or -flight.mission_ned_m(flight.target.position_ned_m)[2] > LOW_M
+    """Whether it is asked for more height than it has; where nobody knows, it may be."""
+    if flight.target is None:
+        return True
+    higher_m = flight.latest.position_ned_m[2] - flight.target.position_ned_m[2]
+    return higher_m > flight.mission.companion.settled.distance_m
 
 
 def _is_pressed(flight: FlightContext, now_us: int) -> bool:
