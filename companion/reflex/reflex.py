@@ -114,7 +114,10 @@ class Reflex:
             is_watched = False
             force.forget()  # half a second without a position is no tilt that lasted half a second
         flown_to = situation.setpoint_position_ned_m if is_watched else None
-        is_free = self.newest is None or self.newest.is_over
+        hit = self.newest
+        is_free = hit is None or hit.is_over
+        # What has just been hit may have turned it, until it has come to rest.
+        may_tip = is_watched and (hit is None or hit.is_over or hit.has_rested)
         for sample in samples:
             if type(sample) is ImuSample:
                 force.add_imu(sample.specific_force_frd_m_s2)
@@ -126,8 +129,7 @@ class Reflex:
                     force.forget()
                 elif late_us >= 0:
                     continue
-                # What has just been hit may have turned it.
-                held = force.step(sample, self.monitor.estimator.strapdown, flown_to, is_free, is_watched)
+                held = force.step(sample, self.monitor.estimator.strapdown, flown_to, is_free, may_tip)
                 if held is not None:
                     return held
         return None

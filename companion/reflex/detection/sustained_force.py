@@ -82,7 +82,7 @@ class SustainedForceMonitor:
         """Take one sample, the attitude and the setpoint as last sent; None while none is flown to.
 
         What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
-        `is_free`: of a vehicle that nothing touches. `may_tip`: one that tips is looked for, too.
+        `is_free`: of a vehicle that nothing touches, as wind is learnt. `may_tip`: one that tips is looked for, too.
         """
         now_us, attitude_wxyz = sample.time_boot_us, strapdown.valid_wxyz
         if is_free and self.time_us and hovers(sample.velocity_ned_m_s):
@@ -90,7 +90,7 @@ class SustainedForceMonitor:
             across, elapsed_s = flat(body_to_ned(attitude_wxyz, (x, y, 0.0))), 1e-6 * (now_us - self.time_us)
             self.hover_wind_m_s2 = towards(self.hover_wind_m_s2, across, elapsed_s / (reflex.SMOOTHING_S + elapsed_s))
         thrust = self._held(sample, goal_ned_m, self._smooth(sample, strapdown))
-        if thrust is None and is_free and may_tip:
+        if thrust is None and may_tip:
             thrust = self._tipped(strapdown)
         if thrust is None:
             return None

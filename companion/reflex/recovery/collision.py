@@ -104,6 +104,11 @@ class Collision:
         return self.settled.duration_s if self.keeps_trim else reflex.RESTS_S
 
     @property
+    def has_rested(self) -> bool:
+        """Whether it came to rest by attitude, and is flown by a position since."""
+        return self.law.leans and not self.leans
+
+    @property
     def contact(self) -> Contact:
         return self.estimator.contact
 
