@@ -82,7 +82,7 @@ class SustainedForceMonitor:
         """Take one sample, the attitude and the setpoint as last sent; None while none is flown to.
 
         What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
-        `is_free`: of a vehicle that nothing touches, as wind is learnt. `may_tip`: one that tips is looked for, too.
+        `is_free`: nothing touches the vehicle, and wind may be learnt. `may_tip`: one that tips is looked for, too.
         """
         now_us, attitude_wxyz = sample.time_boot_us, strapdown.valid_wxyz
         if is_free and self.time_us and hovers(sample.velocity_ned_m_s):

@@ -157,7 +157,7 @@ class Collision:
         is_rejected = self.is_rejected(sample.time_boot_us)
         self._touch(sample)
         rested_s = rebound_m_s = None
-        if self.law.follows and (self.leans or not self.law.leans):
+        if self.law.follows and not self.has_rested:
             rested_s, rebound_m_s = self._follow(sample)
         self.settled_after_s = self._settled_after_s(sample)
         return Progress(is_rejected, rested_s, rebound_m_s)
