@@ -123,7 +123,7 @@ def _offboard_loss(name: str, action: float, setup: Setup) -> PreflightItem:
     called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
     remedy = f"{name} = {LOSS_LAND} (land)"
     drops, needs_sticks = number in LOSS_DROPS, number in LOSS_NEEDS_STICKS
-    beyond = ": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns"
+    beyond = ": the vehicle would fall" if drops else "; without sticks PX4 sinks and drifts, or returns"
     found = f"{number} ({called}) when setpoints stop"
     return judged(name, found, needs_sticks, remedy, is_bad=drops, mended=LOSS_LAND, beyond=beyond)
 
