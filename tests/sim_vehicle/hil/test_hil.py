@@ -5,13 +5,16 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.autopilot.px4.setup import judge_parameters
+from companion.autopilot.setup import Setup, Verdict
+from companion.reflex.config import EstimateConfig
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import NotInLockstep
 from sim_vehicle.estimator.samples import CaptureSample, FlowSample, RangeSample
 from sim_vehicle.geography import Place
 from sim_vehicle.hil.exchange import ANSWER_TIMEOUT_US, STARTING_TIMEOUT_US, Exchange, ExchangePhase
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Air, HilGps, HilSensor
-from sim_vehicle.hil.parameters import px4_parameters
+from sim_vehicle.hil.parameters import Position, px4_parameters
 from sim_vehicle.hil.sensors import air_at
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.decode import Decoder
@@ -212,3 +215,12 @@ def test_a_unit_of_roll_torque_turns_as_fast_as_the_gains_assume():
     per_unit = (p1 - p0) / (1e-6 * (t1 - t0)) / part
     loop_per_s = 2 * FOLDABLE.control.attitude_damping * FOLDABLE.control.attitude_frequency_rad_s
     assert values["MC_ROLLRATE_P"] * per_unit == pytest.approx(loop_per_s, rel=0.05)
+
+
+@pytest.mark.parametrize("position", ["mocap", "gps", "flow"])
+def test_they_are_what_preflight_asks_for(position: Position) -> None:
+    told = {parameter.name: parameter.value for parameter in px4_parameters(FOLDABLE, position)}
+    setup = Setup(told, None, "quadrotor", EstimateConfig(), 250.0, 5.0, "")
+    found = {item.item: item.verdict for item in judge_parameters(setup) if item.item in told}
+    assert {"COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RCL_EXCEPT", "IMU_INTEG_RATE"} <= set(found)
+    assert set(found.values()) == {Verdict.GOOD}
