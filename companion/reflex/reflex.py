@@ -147,7 +147,8 @@ class Reflex:
         shown = self.config.detector, impact.size_m_s2, source, estimator
         how = self.law, self.law_config, self.settled
         self.newest = Collision(now_us, *shown, *how, room, surfaces, self.keeps_trim)
-        if not earlier and self._is_attitude_heard:
+        # Behind a filter that hides clipping the vehicle's velocity may show nothing of a true hit.
+        if not earlier and self._is_attitude_heard and not source.hides_clipping:
             force_ned = body_to_ned(source.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
             averaging_s = self.config.estimate.imu_averaging_interval_s
             self.newest.hypothesis = hypothesis_of(estimate, force_ned, averaging_s, estimator.left_before_m_s)

@@ -379,10 +379,14 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
     # And velocities that it may have spoilt do not reject the next one
     source, first = reflex.monitor.estimator, reflex.hits[0]
     first.is_over, may_be_wrong_m_s = True, first.estimator.left_m_s
-    second = reflex.begin(source.begin(Impact(us, us - INTERVAL_US, (-40.0, 0.0, 0.0), ImpactKind.WALL)), room, us)
+    impact = Impact(us, us - INTERVAL_US, (-40.0, 0.0, 0.0), ImpactKind.WALL)
+    second = reflex.begin(source.begin(impact), room, us)
     assert second.hypothesis is not None and second.hypothesis.left_m_s == may_be_wrong_m_s > 0.0
     # which, taken back, leaves what is known of the first, of which nothing is left at last
     reflex.take_back()
     assert reflex.newest is first and source.followed == [first.estimator] and not source.is_valid
     reflex.take_back()
     assert reflex.hits == [] and source.is_valid
+    # Velocities behind a filter may show nothing of a true hit, and reject none
+    source.hides_clipping = True
+    assert reflex.begin(source.begin(impact), room, us).hypothesis is None

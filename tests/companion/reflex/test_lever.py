@@ -180,7 +180,7 @@ def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belie
     # The sensor moves, the vehicle does not.
     assert math.hypot(*source.strapdown.sum_ned_m_s) > 0.3
     assert math.hypot(*found.motion.velocity_ned_m_s) < 0.05 and math.hypot(*found.external_m_s2) < 0.3
-    source.update(GpsFix((0.0, 0.0), 47.0, 8.0, 0.0))
+    source.update(GpsFix(0, (0.0, 0.0), 47.0, 8.0, 0.0))
     assert math.hypot(*source.doppler.velocity_ned_m_s) < 0.05
 
 
