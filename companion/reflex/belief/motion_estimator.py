@@ -316,11 +316,11 @@ class MotionEstimator:
         half = plus(ZERO, 0.5, minus(self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s))
         if bank is None:
             bank = self._bank = FilterBank(self.start, self.spread_m_s, half, self.hit_boot_us)
+        level_m_s2 = self.level_m_s2
         if self._is_right:
             bank.drop_errors()
-            half = ZERO
-        level_m_s2 = self.level_m_s2
-        if not self.fits_models:
+            half = level_m_s2 = ZERO
+        elif not self.fits_models:
             # By a wrong tilt a vehicle that leans reports a climb that there is none of. PX4 corrects its own sooner.
             level_m_s2 = plus(level_m_s2, self._sinks_m_s2, (0.0, 0.0, 1.0))
         bank.predict(now_us, self._summed_m_s, level_m_s2)

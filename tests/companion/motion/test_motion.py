@@ -249,6 +249,18 @@ def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estima
     assert found.tilted_m_s2[0] == pytest.approx(0.0, abs=0.1)
 
 
+def test_a_reported_velocity_that_is_right_is_believed_however_wrong_its_tilt_is():
+    # Given an estimate that agrees with the receiver again, and gyroscopes by which its tilt is wrong by 3 degrees
+    air, found = clipped(rebound_m_s=0.0)
+    go_on(air, found, 2.0)
+    air.strapdown.level_acceleration_m_s2 = (0.5, 0.0, 0.0)
+    air.reported_off_m_s = 0.0
+    go_on(air, found, 3.0)
+    # Then its velocity counts as it is
+    assert not found.is_measured_apart
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.0, abs=0.01)
+
+
 def test_an_error_that_no_model_has_is_followed_as_it_fades():
     # Given an estimate that stays wrong, as PX4's by satellites does for ten seconds
     air, found = clipped(rebound_m_s=0.0)
