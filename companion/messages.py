@@ -125,13 +125,11 @@ class LocalPosition(Sample):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix(Sample):
-    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and place.
+    """GPS_RAW_INT: the receiver's own horizontal velocity, by Doppler shift, and place. Its stamp is no boot time.
 
-    The stamp is when the autopilot took it, by its boot clock, or, of some, by another. The altitude is above mean sea
-    level.
+    The altitude is above mean sea level.
     """
 
-    stamp_us: int
     velocity_ne_m_s: tuple[float, float]
     latitude_deg: float
     longitude_deg: float

@@ -142,14 +142,14 @@ def _text(*values: float) -> str:
 FIX_3D, UNKNOWN = 3, 0xFFFF
 
 
-def _gps_raw(time_usec: int, fix_type: int, lat: int, lon: int, alt: int, vel: int, cog: int) -> Sample | None:
+def _gps_raw(fix_type: int, lat: int, lon: int, alt: int, vel: int, cog: int) -> Sample | None:
     if fix_type < FIX_3D or UNKNOWN in (vel, cog):
         return None
     speed_m_s, course_rad = 0.01 * vel, math.radians(0.01 * cog)
     if speed_m_s > messages.VELOCITY_M_S:
         return Refused("GPS_RAW_INT", f"speed {speed_m_s:g} m/s")
     velocity_ne_m_s = (speed_m_s * math.cos(course_rad), speed_m_s * math.sin(course_rad))
-    return messages.GpsFix(time_usec, velocity_ne_m_s, 1e-7 * lat, 1e-7 * lon, 1e-3 * alt)
+    return messages.GpsFix(velocity_ne_m_s, 1e-7 * lat, 1e-7 * lon, 1e-3 * alt)
 
 
 def _heartbeat(

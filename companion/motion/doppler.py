@@ -1,10 +1,10 @@
 """The velocity that a satellite receiver measures by Doppler shift, and its place, carried on to now.
 
-No accelerometer has a part in it: after a clipped hit it shows what the vehicle's own estimate lacks. The autopilot
-sends at t what it took at the stamp s, and what was measured earlier. Delay and noise are learnt in free flight. With
-the vehicle's own velocity v, its acceleration a by the accelerometer and the delay d
+No accelerometer has a part in it: after a clipped hit it shows what the vehicle's own estimate lacks. What is received
+now was measured earlier. Delay and noise are learnt in free flight. With the vehicle's own velocity v, its acceleration
+a by the accelerometer and the delay d
 
-    u(t) = v(s - d) + noise,    u(t) - v(s) = -d a + noise
+    u(t) = v(t - d) + noise,    u(t) - v(t) = -d a + noise
 
 How far its place is from the vehicle's own is learnt in free flight, too.
 """
@@ -44,13 +44,9 @@ class Doppler:
     def take(self, sample: GpsFix, strapdown: Strapdown, own: LocalPosition | None, is_free: bool) -> None:
         """Take one fix; `is_free`: the vehicle's own newest report is right. What cannot be carried on to now is left
         out."""
-        age_s = 1e-6 * (strapdown.time_boot_us - sample.stamp_us)
-        if not 0.0 < age_s < numbers.RECEIVER_LATEST_S:
-            age_s = 0.0  # another clock's
         if is_free:
-            self._learn(sample, strapdown, age_s)
-        delay_s, error_s = self.delay.found(self.variance_m2_s2)
-        self.late_s = age_s + delay_s
+            self._learn(sample, strapdown)
+        self.late_s, error_s = self.delay.found(self.variance_m2_s2)
         faster = _faster_by(strapdown, self.late_s)
         if faster is None:
             return
@@ -75,14 +71,14 @@ class Doppler:
             0.0,
         )
 
-    def _learn(self, sample: GpsFix, strapdown: Strapdown, age_s: float) -> None:
+    def _learn(self, sample: GpsFix, strapdown: Strapdown) -> None:
         usual_s = self.delay.expected
-        since, before = _faster_by(strapdown, age_s), _faster_by(strapdown, age_s + usual_s)
-        if since is None or before is None:
+        faster = _faster_by(strapdown, usual_s)
+        if faster is None:
             return
         (n, e), own = sample.velocity_ne_m_s, plus(strapdown.fixes[-1].less_sum_m_s, 1.0, _at_centre(strapdown))
-        behind: Vector3 = (n + since[0] - own[0], e + since[1] - own[1], 0.0)
-        change = plus(ZERO, 1.0 / usual_s, minus(before, since))
+        behind: Vector3 = (n - own[0], e - own[1], 0.0)
+        change = plus(ZERO, 1.0 / usual_s, faster)
         most_m_s = numbers.GATE * math.sqrt(self.variance_m2_s2)
         # A receiver may show a hit before any sample does: neither its noise nor its delay.
         if math.hypot(*plus(behind, self.delay.found(self.variance_m2_s2)[0], change)) < most_m_s:

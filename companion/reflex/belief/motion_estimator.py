@@ -210,7 +210,7 @@ class MotionEstimator:
         was = self._measured
         newest_us = self.pushed_boot_us if was is None else was.taken_boot_us
         needs_none = self.is_fully_measured or (self.has_converged and was is None)
-        if needs_none or doppler.taken_boot_us <= newest_us:
+        if needs_none or doppler.taken_boot_us <= newest_us or self._is_of_before(doppler):
             return
         now_us, summed = self._time_boot_us, self._summed_m_s
         # It begins with what was expected: reports may be wrong in a way that no model has.
@@ -229,6 +229,22 @@ class MotionEstimator:
             off = limited(flat(minus(doppler.place_ned_m, place)), numbers.GATE * reflex.PLACE_SPREAD_M)
             place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
         self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
+
+    def _is_of_before(self, doppler: Doppler) -> bool:
+        """Whether a receiver shows what no vehicle does, and so is late: that it goes on into what it has hit."""
+        normal, is_new = away_from(self.normal.direction_ned), self._since_s < numbers.RECEIVER_LATEST_S
+        left_ned_m_s = minus(doppler.velocity_ned_m_s, self._flown_m_s)
+        return is_new and along(left_ned_m_s, normal) < 0.5 * along(self.contact.velocity_ned_m_s, normal)
+
+    @property
+    def _since_s(self) -> float:
+        """Time since the contact's last sample."""
+        return 1e-6 * (self._time_boot_us - self.pushed_boot_us)
+
+    @property
+    def _flown_m_s(self) -> Vector3:
+        """The accelerometer's integral since then."""
+        return minus(self._summed_m_s, self._released_m_s)
 
     @property
     def is_valid(self) -> bool:
@@ -286,11 +302,9 @@ class MotionEstimator:
 
     def _look_back(self) -> None:
         """The velocity just after the contact: the present one less what the accelerometer has shown since."""
-        since_s = 1e-6 * (self._time_boot_us - self.pushed_boot_us)
-        error_m_s = math.hypot(self.spread_m_s, numbers.LEVEL_SPREAD_M_S2 * since_s)
+        error_m_s = math.hypot(self.spread_m_s, numbers.LEVEL_SPREAD_M_S2 * self._since_s)
         if error_m_s < self.after_error_m_s:
-            flown_m_s = minus(self._summed_m_s, self._released_m_s)
-            self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, flown_m_s)
+            self.after_ned_m_s = minus(self.motion.velocity_ned_m_s, self._flown_m_s)
             self.after_error_m_s = error_m_s
 
     @property

@@ -72,10 +72,15 @@ class FusedState(DetectorState):
     """Of the newest sample, or of two together: in limits, and as the accelerometer shows it."""
     force_before: tuple[float, Vector3] = (0.0, ZERO)  # the one before
 
-    def side_threshold_m_s2(self, config: reflex.FusedConfig, lever: Lever) -> float:
-        """Horizontal threshold, m/s^2. In a turn what is not known of the accelerometer's place adds to the noise."""
-        turned_m_s2 = config.noise_factor * lever.error_m_s2
-        return math.hypot(self.threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
+    def side_m_s2(self, x: float, y: float, config: reflex.FusedConfig, lever: Lever) -> float:
+        """Horizontal force, m/s^2, less what a turn may make of it: along that, an unknown height of the accelerometer
+        adds to the noise.
+        """
+        (a, b), limit = lever.error_frd_m_s2, self.threshold_m_s2 + lever.unseen_m_s2
+        if (error_m_s2 := math.hypot(a, b)) == 0.0:
+            return math.hypot(x, y)
+        turned_m_s2 = math.hypot(self.threshold_m_s2, config.noise_factor * error_m_s2) + lever.unseen_m_s2
+        return math.hypot(x * b - y * a, (x * a + y * b) * limit / turned_m_s2) / error_m_s2
 
     def side_force(self, config: reflex.FusedConfig, lever: Lever) -> tuple[float, float, bool]:
         """Horizontal force and its limit, m/s^2; whether it is that of two samples together.
@@ -84,28 +89,29 @@ class FusedState(DetectorState):
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
         f, mean = lever.force_frd_m_s2, self.floor.mean_frd_m_s2[:2]
-        force = f[:2]
-        alone, limit = math.dist(force, mean), self.side_threshold_m_s2(config, lever)
+        limit = self.threshold_m_s2 + lever.unseen_m_s2
+        alone = self.side_m_s2(f[0] - mean[0], f[1] - mean[1], config, lever)
         if self.phase is not Phase.ARMED:
             return alone, limit, False
         if math.hypot(*mean) > config.side_threshold_m_s2:
             # The mean is a push, whose end is no hit.
-            alone = min(alone, math.hypot(*force))
+            alone = min(alone, self.side_m_s2(f[0], f[1], config, lever))
         if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, limit, False
-        together, of_two = self._together_m_s2(f), self.before_threshold_m_s2 / self.threshold_m_s2
+        together, of_two = self._together_m_s2(f, config, lever), self.before_threshold_m_s2 / self.threshold_m_s2
         if together / of_two > alone / reflex.CLEAR:
             return together, of_two * limit, True
         return alone, reflex.CLEAR * limit, False
 
-    def _together_m_s2(self, force_frd_m_s2: Vector3) -> float:
+    def _together_m_s2(self, force_frd_m_s2: Vector3, config: reflex.FusedConfig, lever: Lever) -> float:
         """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
         noise of a sum grows. Vibration alternates, a contact does not.
 
         Compared with zero, too: a slow swing that the mean has not followed is none.
         """
-        (m_x, m_y, _), both = self.floor.mean_frd_m_s2, plus(force_frd_m_s2, 1.0, self.last_frd_m_s2)
-        return math.sqrt(0.5) * min(math.hypot(both[0] - 2.0 * m_x, both[1] - 2.0 * m_y), math.hypot(*both[:2]))
+        (m_x, m_y, _), (x, y, _) = self.floor.mean_frd_m_s2, plus(force_frd_m_s2, 1.0, self.last_frd_m_s2)
+        beside = self.side_m_s2(x - 2.0 * m_x, y - 2.0 * m_y, config, lever)
+        return math.sqrt(0.5) * min(beside, self.side_m_s2(x, y, config, lever))
 
     def both(self, ratio: float, step_frd_m_s: Vector3) -> Vector3 | None:
         """The direction of a velocity jump and the weak force before it, body FRD: each is as clear as it is large

@@ -302,8 +302,22 @@ def test_a_turn_needs_a_stronger_force_until_one_beyond_the_gyroscopes_noise_has
     flight.state.threshold_m_s2 = 1.75
     for rate_rad_s in (0.0, 0.0, 0.24, 0.48):
         flight.motion.lever.imu(4_000, ZERO, (rate_rad_s, 0.0, 0.0), 4_000)
+    # Then it does along what the turn makes of a sensor above or below, and across that none
     most_m_s2 = 1.9 if is_known else math.hypot(1.75, 4.2 * 0.05 * 60.0)
-    assert flight.state.side_threshold_m_s2(FusedConfig(), flight.motion.lever) == pytest.approx(most_m_s2, rel=0.1)
+    lever = flight.motion.lever
+    along, across = (flight.state.side_m_s2(*push, FusedConfig(), lever) for push in ((0.0, 1.0), (1.0, 0.0)))
+    assert along == pytest.approx((1.75 + lever.unseen_m_s2) / most_m_s2, rel=0.1) and across == pytest.approx(1.0)
+
+
+def test_a_hit_that_turns_the_vehicle_shows_across_what_the_turn_makes_of_a_sensor_of_unknown_height():
+    # Given a hit that rolls a vehicle with 100 rad/s^2, and pushes it back through a filter
+    def rolls(t_us):
+        return (1e-4 * min(max(t_us - HIT_US, 0), 20_000), 0.0, 0.0)
+
+    flight = Flight(lambda t_us: (-6.0 * (0 <= t_us - HIT_US < 20_000), 0.0, 0.0), rates=rolls)
+    # Then its first whole sample shows it
+    (hit,) = flight.fly(3_500_000)
+    assert hit.sample_time_boot_us == pytest.approx(HIT_US + 4_000, abs=4_000) and hit.evidence is Evidence.FORCE
 
 
 def test_a_spin_about_the_thrust_shows_where_the_sensor_is_though_drag_changes_with_it():

@@ -55,7 +55,7 @@ class Turning:
             turn.imu(number * self.every_us, (number + 1) * self.every_us, w, config)
             lever.imu(self.every_us, f, w, WINDOW_US)
             x, y, _ = lever.force_frd_m_s2
-            turned_m_s2 = config.noise_factor * lever.error_m_s2
+            turned_m_s2 = config.noise_factor * math.hypot(*lever.error_frd_m_s2)
             yield math.hypot(x, y), math.hypot(config.side_threshold_m_s2, turned_m_s2) + lever.unseen_m_s2
             if turn.turns_rad_s2 > TURNS_PER_S2 or lever.spins_per_s2 > TURNS_PER_S2:
                 lever.learn(0.25, 1e-6 * self.every_us)
@@ -118,7 +118,7 @@ def test_across_a_gap_nothing_is_known_of_a_turn() -> None:
     lever.imu(WINDOW_US, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0), WINDOW_US)
     lever.imu(200_000, (1.0, 0.0, -9.8), (3.0, 2.0, 1.0), WINDOW_US)
     assert lever.force_frd_m_s2 == (1.0, 0.0, -9.8)
-    assert (lever.error_m_s2, lever.unseen_m_s2) == (0.0, 0.0)
+    assert (lever.error_frd_m_s2, lever.unseen_m_s2) == ((0.0, 0.0), 0.0)
 
 
 PLACE_M = (0.06, -0.02, -0.05)
@@ -180,7 +180,7 @@ def test_what_a_sensor_beside_the_centre_shows_of_a_spin_moves_neither_the_belie
     # The sensor moves, the vehicle does not.
     assert math.hypot(*source.strapdown.sum_ned_m_s) > 0.3
     assert math.hypot(*found.motion.velocity_ned_m_s) < 0.05 and math.hypot(*found.external_m_s2) < 0.3
-    source.update(GpsFix(0, (0.0, 0.0), 47.0, 8.0, 0.0))
+    source.update(GpsFix((0.0, 0.0), 47.0, 8.0, 0.0))
     assert math.hypot(*source.doppler.velocity_ned_m_s) < 0.05
 
 

@@ -255,7 +255,7 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
     heard = (attitude._replace(sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
     imu, end_us = LoggedSample(*log.imu()[0]), log.heard[-1].at_us
-    here = LoggedSample(end_us, GpsFix(0, (0.0, 0.0), 47.397742, 8.545594, 488.0))
+    here = LoggedSample(end_us, GpsFix((0.0, 0.0), 47.397742, 8.545594, 488.0))
     content, log = BytesIO(), replace(log, heard=(imu, *heard, LoggedSample(end_us, moved), here))
     write_mcap(replace(shown, truth=None), log, content)
     topics = read_mcap(content.getvalue())
