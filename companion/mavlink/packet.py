@@ -81,6 +81,6 @@ def checksum_holds(data: bytes, start: int, length: int) -> bool:
     crc_extra = _CRC_EXTRA.get(message_id_of(packet))
     if crc_extra is None:
         return end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2)
-    checked = length - CHECKSUM - (SIGNATURE if has_signature(packet) else 0)
+    checked = (HEADER_V2 if packet[0] == MAGIC_V2 else HEADER_V1) + packet[1]
     checksum: int = mcrf4xx(packet[1:checked] + crc_extra)
     return packet[checked : checked + CHECKSUM] == checksum.to_bytes(CHECKSUM, "little")

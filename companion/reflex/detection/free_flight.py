@@ -58,7 +58,6 @@ class Lever:
     place_frd_m: Vector3 = ZERO
     errors_m: Vector3 = (reflex.LEVER_M, reflex.LEVER_M, reflex.LEVER_M)  # standard deviations
     force_frd_m_s2: Vector3 = ZERO  # of the newest sample, sideways as at that point
-    error_frd_m_s2: tuple[float, float] = (0.0, 0.0)  # of its sideways part, by the height's standard deviation
     unseen_m_s2: float = 0.0  # by what a turn between samples and a place beside the centre may make it more
     spins_per_s2: float = 0.0  # square of the rates
     _before_rad_s: Vector3 = ZERO  # rates of the sample before the newest
@@ -80,7 +79,7 @@ class Lever:
         i, j, _ = self._turns_rad_s2
         self._rates_rad_s, self.force_frd_m_s2, self._shown_m_s2 = w, f, f
         if not 0 < elapsed_us < LONGEST_GAP_US:
-            self._turns_rad_s2, self.error_frd_m_s2, self.unseen_m_s2, self.spins_per_s2 = ZERO, (0.0, 0.0), 0.0, 0.0
+            self._turns_rad_s2, self.unseen_m_s2, self.spins_per_s2 = ZERO, 0.0, 0.0
             return
         per_s = 1e6 / elapsed_us
         # What no motor makes is none: of one forged rate it is little.
@@ -95,7 +94,6 @@ class Lever:
         # That may all have come while the accelerometer measured. Rates differ by what was half an interval ago, too.
         unseen_share = 1.0 - averaging_us / elapsed_us
         (x, y, z), (x_error, y_error, z_error) = self.place_frd_m, self.errors_m
-        self.error_frd_m_s2 = (z_error * (p * r + j), z_error * (q * r - i))
         self.unseen_m_s2 = (abs(z) + z_error) * changes * (unseen_share if unseen_share > 0.5 else 0.5)
         self.unseen_m_s2 += (x_error if x_error > y_error else y_error) * square
         n = p * x + q * y + r * z
@@ -104,6 +102,12 @@ class Lever:
             f[1] - k * x + i * z - q * n + square * y,
             f[2],
         )
+
+    @property
+    def error_frd_m_s2(self) -> tuple[float, float]:
+        """Standard deviation of the force's sideways part, along what a turn makes of it, by that of the height."""
+        (p, q, r), (i, j, _), z_error = self._before_rad_s, self._turns_rad_s2, self.errors_m[2]
+        return z_error * (p * r + j), z_error * (q * r - i)
 
     def learn(self, variance: float, elapsed_s: float) -> None:
         """Take the newest sample of a free vehicle that turns beyond the gyroscopes' noise.
