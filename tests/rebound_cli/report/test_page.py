@@ -165,7 +165,9 @@ def test_it_says_first_what_was_hit_and_a_hit_has_its_place_its_normal_with_its_
     assert moment["touched_ms"] == pytest.approx(-hit["truth"]["detection_latency_ms"], abs=0.001)
     why = "\n".join(moment["reasons"])
     # The sample shows 34 m/s^2, of which the vehicle's turn may have made a part
-    assert re.search(r"Push sideways: 2\d\.\d m/s², a hit from \d\.\d on \(\d\.\d times\): speaks for a contact\.", why)
+    assert re.search(
+        r"Push sideways: 2\d\.\d m/s², a hit from \d\.\d on \(1\d\.\d times\): speaks for a contact\.", why
+    )
     assert "A landing: no" in why and "A person's hand: no" in why and "Verdict: wall, a collision" in why
     # The ground that it landed on is no false alarm
     assert not any("false alarm" in reason for one in opened.data["moments"] for reason in one["reasons"])
