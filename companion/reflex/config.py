@@ -57,6 +57,10 @@ COMPARED = 3
 # Velocities further apart are not compared: samples cover a quarter of the time, and the filter corrects itself in
 # between. At 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
+# Vibration between the samples is missing in their integral. When a rotor's turns come to beat with the stream, it has
+# one sign there for tenths of a second. Its amplitude is 1.4 times the standard deviation of both axes, which is taken
+# larger by EXCESS: this is the 0.1 s between the compared velocities.
+SHAKEN_S = 0.1
 
 # --- rate jumps
 # A jump is one from the mean of the rate over this time: as long as the shortest contact of spring arms.

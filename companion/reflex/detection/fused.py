@@ -308,9 +308,12 @@ class FusedDetector:
         step = jump.step_m_s(strapdown.fixes)
         if step is None:
             return None
+        # Vibration between the samples, of whose newest interval an averaging window covers a part.
+        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
+        unseen_m_s = reflex.SHAKEN_S * shaking_m_s2 * max(0.0, 1.0 - self._averaging_us / max(s.turn.over_us, 1))
         # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
         caution = 1.0 if type(sample) is Odometry and math.isfinite(motion.left_m_s) else 2.0
-        least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s)
+        least = math.hypot(jump.least_m_s(config, caution), config.noise_factor * jump.error_m_s) + unseen_m_s
         size = math.hypot(*step)
         corrected_m_s = 0.0 if motion.after is None else motion.after.correction_m_s(jump.compared_us, left_m_s)
         s.velocity.value, s.velocity.limit = size, least + corrected_m_s

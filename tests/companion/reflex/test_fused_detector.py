@@ -227,6 +227,18 @@ def test_a_sudden_climb_is_no_hit_before_it_is_known_how_late_velocities_are():
     assert Flight(lift=lambda t: GRAVITY * (2.6 if t >= 2_976_000 else 1.0)).fly(3_600_000) == []
 
 
+@pytest.mark.parametrize("jump_m_s", [0.0, -1.0])
+def test_vibration_that_comes_to_beat_with_the_stream_is_no_jump_and_hides_none(jump_m_s):
+    # Given rotors that turn faster, until 4 ms in 20 show their vibration always at nearly the same phase
+    def shakes(t_us):
+        turns = 1e-6 * (t_us - HIT_US) * (95.0 if t_us > HIT_US else 87.0)
+        return 6.0 * math.sin(2.0 * math.pi * turns), 0.0, 0.0
+
+    jump = (4_001_000, (jump_m_s, 0.0, 0.0), 0)
+    impacts = Flight(shakes, imu_every_us=20_000, noise=0.1, velocity_noise=0.005, jump=jump).fly(4_200_000)
+    assert [impact.evidence for impact in impacts] == [Evidence.VELOCITY_JUMP] * bool(jump_m_s)
+
+
 def test_a_hit_is_no_noise_that_would_hide_the_next_one():
     struck, free = (Flight(pulse((f, 0.0, 0.0)), 20_000, velocity_noise=0.05) for f in (-3000.0, 0.0))
     assert (len(struck.fly(3_400_000)), len(free.fly(3_400_000))) == (1, 0)
