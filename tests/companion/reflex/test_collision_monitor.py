@@ -21,7 +21,7 @@ from companion.motion.history import Lateness
 from companion.motion.strapdown import LEVEL
 from companion.motion.vector import ZERO
 from companion.reflex.belief.motion_estimator import MotionEstimator
-from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, RecoveryConfig
+from companion.reflex.config import RecoveryConfig
 from companion.reflex.detection.confirmation import hypothesis_of
 from companion.reflex.detection.detector import Impact, ImpactKind, Phase, Situation
 from companion.reflex.detection.monitor import advance, start_monitor
@@ -292,7 +292,7 @@ def test_a_turn_is_a_hit_where_it_is_known_whereto_the_vehicle_flies(left_m_s, h
 
 @pytest.mark.parametrize(
     ("push", "normal", "error_rad"),
-    [(STILL, (-1.0, 0.0, 0.0), APPROACH_RAD), ((-20.0, 20.0, 0.0), (-0.707, 0.707, 0.0), IMPULSE_RAD)],
+    [(STILL, (-1.0, 0.0, 0.0), 0.6), ((-20.0, 20.0, 0.0), (-0.707, 0.707, 0.0), 0.35)],
 )
 def test_a_turn_shows_no_direction_and_needs_no_other_evidence(push, normal, error_rad):
     watch = Watch().fly(
@@ -302,7 +302,7 @@ def test_a_turn_shows_no_direction_and_needs_no_other_evidence(push, normal, err
         rates=lambda t: (0.0, 0.0, 3.0 if t >= 2_500_000 else 0.0),
     )
     (hit,), known = watch.impacts, watch.monitor.estimator.estimate
-    assert hit.normal.error_rad == APPROACH_RAD and known.time_boot_us == hit.time_boot_us
+    assert hit.normal.error_rad == 0.6 and known.time_boot_us == hit.time_boot_us
     assert known.normal.direction_ned == pytest.approx(normal, abs=0.1)
     assert known.normal.error_rad == error_rad and not known.is_fully_measured
     assert hypothesis_of(hit, hit.impact.specific_force_frd_m_s2, 0.005, 0.0) is None

@@ -12,7 +12,7 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPositio
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, plus
 from companion.reflex.config import EXCESS, LEVER_M, EstimateConfig, FusedConfig
-from companion.reflex.detection.detector import Evidence, ImpactKind, Phase, Situation
+from companion.reflex.detection.detector import ON_THE_GROUND, Evidence, ImpactKind, Phase, Situation
 from companion.reflex.detection.free_flight import ForceNoise
 from companion.reflex.detection.fused import FusedDetector, FusedState
 from companion.reflex.detection.health import promise_of
@@ -106,6 +106,16 @@ def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push,
     velocity = (0.0, 0.0, -1.0) if kind is ImpactKind.CEILING else (0.0, 0.0, 0.0)
     impacts = Flight(pulse(push), velocity=velocity).fly()
     assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
+
+
+# It hovers with 0.35 of its thrust, which is 28 m/s^2. Where that is unknown it may be 5 g.
+@pytest.mark.parametrize(
+    ("up_m_s2", "knows_thrust", "hits"), [(20.0, True, 0), (30.0, True, 1), (30.0, False, 0), (60.0, False, 1)]
+)
+def test_a_push_along_the_thrust_shows_where_it_is_more_than_the_propellers_can_make(up_m_s2, knows_thrust, hits):
+    heard = (LocalPosition, Attitude, AttitudeTarget) if knows_thrust else (LocalPosition, Attitude)
+    flight = Flight(pulse((0.0, 0.0, -up_m_s2), length_us=8_000), heard=heard)
+    assert len(flight.fly(until_us=3_018_000)) == hits
 
 
 # --- velocity jump ------------------------------------------------------------------------------------------
@@ -271,12 +281,27 @@ def gone(t):
         {"lift": lambda t: GRAVITY * (1.0 if t < HIT_US else 1.3)},  # payload dropped: 30 % more lift for its mass
         {"lift": lambda t: GRAVITY * (1.0 + 0.4 * math.sin(t * 20e-6))},  # climbs and dives
         {"push": lambda t: (1.1 * min(1.0, max(0.0, (t - HIT_US) / 3e5)), 0.0, 0.0)},  # a gust of 5 m/s in 0.3 s
+        {
+            "push": lambda t: (10.4 * min(1.0, max(0.0, (t - HIT_US) / 8e5)), 0.0, 0.0),
+            "noise": 0.05,
+        },  # a storm in 0.8 s
         {"noise": 2.5},
         {"noise": 1.0, "lift": lambda t: GRAVITY * (1.0 + min(1.5, max(0, t - HIT_US) / 6e4))},  # and more as it climbs
         {"push": lambda t: (1.5 * (t > HIT_US), 0.0, 0.0)},  # an accelerometer whose zero moves at once
         {"push": lambda t: (-3.0 * min(1.0, max(0.0, (t - HIT_US) / 1.5e6)) * (t < 5_000_000), 0.0, 0.0)},  # a door
     ],
-    ids=["free fall", "motor fails", "payload drop", "climbs", "gust", "shaking", "shaking climb", "zero moves", "end"],
+    ids=[
+        "free fall",
+        "motor fails",
+        "payload drop",
+        "climbs",
+        "gust",
+        "storm",
+        "shaking",
+        "shaking climb",
+        "zero moves",
+        "end",
+    ],
 )
 def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     until_us = 3_150_000 if "rates" in scene else 6_000_000
@@ -423,6 +448,12 @@ def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
 
 
+@pytest.mark.parametrize(("force_m_s2", "kind"), [(4.0, ImpactKind.CONTACT), (6.0, ImpactKind.STRUCK)])
+def test_a_soft_strike_on_a_hovering_vehicle_is_known_by_how_suddenly_it_begins(force_m_s2, kind):
+    flight = Flight(pulse((force_m_s2, 0.0, 0.0), length_us=100_000), velocity=(0.0, 0.0, 0.0), noise=0.02)
+    assert [impact.kind for impact in flight.fly(3_300_000)] == [kind]
+
+
 @pytest.mark.parametrize(("speed_m_s", "own_m_s2", "from_us"), [(0.3, -1.0, 2_400_000), (0.0, -1.5, 2_560_000)])
 def test_what_stops_a_vehicle_that_turns_back_or_has_left_its_hover_is_no_hand(speed_m_s, own_m_s2, from_us):
     def soft(t):
@@ -434,6 +465,17 @@ def test_what_stops_a_vehicle_that_turns_back_or_has_left_its_hover_is_no_hand(s
 
 
 # --- phases -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("after_us", "hits"), [(200_000, 0), (400_000, 1)])
+def test_after_take_off_the_rotors_noise_is_learnt_before_a_hit_counts(after_us, hits):
+    off_us = 2_700_000
+
+    def situation(t_us):
+        return IN_FLIGHT._replace(off_reason=ON_THE_GROUND if t_us < off_us else None)
+
+    flight = Flight(pulse((-30.0, 0.0, 0.0), off_us + after_us, 8_000), situation=situation)
+    assert len(flight.fly(off_us + 700_000)) == hits
 
 
 def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
