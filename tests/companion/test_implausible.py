@@ -109,17 +109,28 @@ def test_a_reset_moves_no_vehicle_and_is_told_but_where_it_puts_right_what_a_hit
 
 
 @pytest.mark.parametrize(
-    ("force_m_s2", "noise_m_s", "changed_m_s", "is_none"),
-    [(14.0, 0.0, 0.0, True), (14.0, 0.0, 0.04, False), (14.0, 0.1, 0.0, False), (140.0, 0.1, 0.0, True)],
+    ("force_m_s2", "noise_m_s", "changed_m_s", "across_m_s", "is_none"),
+    [
+        (14.0, 0.0, 0.0, 0.0, True),
+        (14.0, 0.0, 0.04, 0.0, False),
+        (14.0, 0.1, 0.0, 0.0, False),
+        (60.0, 0.1, 0.0, 0.0, True),
+        # A stuck axis shows no force along itself
+        (14.0, 0.0, 0.0, 0.4, True),
+        (14.0, 0.0, 0.0, 0.6, False),
+    ],
 )
-def test_velocities_reject_one_sample_whose_impulse_they_would_show(force_m_s2, noise_m_s, changed_m_s, is_none):
-    # 14 m/s^2 for 5 ms are 0.07 m/s; beside a noise of 0.1 m/s velocities say nothing of that, and of 0.7 m/s they do
+def test_velocities_reject_one_sample_whose_impulse_they_would_show(
+    force_m_s2, noise_m_s, changed_m_s, across_m_s, is_none
+):
+    # 14 m/s^2 for 5 ms are 0.07 m/s; beside a noise of 0.1 m/s velocities say nothing of that, and of 0.3 m/s they do
     earlier, noise = ImuSample(996_000, (0.0, 0.0, -9.8), STILL), random.Random(1)
     # Given a vehicle that hovers, every 10 ms its velocity less the accelerometer's sum, which has all of the claim's
     less_m_s, heard = changed_m_s - 0.004 * force_m_s2, []
     for at_ms in range(800, 1160, 10):
         north_m_s = noise.gauss(0.0, noise_m_s) + (less_m_s if at_ms > 1000 else 0.0)
-        heard.append(VelocityFix(at_ms * 1000, (north_m_s, 0.001 * (at_ms % 3), 0.0), STILL))
+        east_m_s = 0.001 * (at_ms % 3) + (across_m_s if at_ms > 1000 else 0.0)
+        heard.append(VelocityFix(at_ms * 1000, (north_m_s, east_m_s, 0.0), STILL))
     hypothesis = Hypothesis(
         1_000_000, 996_000, 0.005 * force_m_s2, (1.0, 0.0, 0.0), force_m_s2, earlier, later_boot_us=1_004_000
     )

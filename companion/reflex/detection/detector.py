@@ -148,6 +148,7 @@ class DetectorState:
     peak_specific_force_m_s2: float = 0.0  # of that contact, per unit mass, the largest in one sample so far
     threshold_m_s2: float = 0.0  # what a sample must reach now
     thrust: ThrustGain = field(default_factory=ThrustGain)  # learnt in free air
+    turn: Innovation = field(default_factory=Innovation)  # a jump of the body rates
 
 
 class Detector(Protocol):

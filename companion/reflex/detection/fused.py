@@ -99,7 +99,8 @@ class FusedState(DetectorState):
         if self.threshold_m_s2 <= reflex.SHAKING * config.side_threshold_m_s2:
             return alone, limit, False
         together, of_two = self._together_m_s2(f, config, lever), self.before_threshold_m_s2 / self.threshold_m_s2
-        if together / of_two > alone / reflex.CLEAR:
+        # A clear one is no mean with the weak one before it.
+        if alone < reflex.CLEAR * limit and together / of_two > alone / reflex.CLEAR:
             return together, of_two * limit, True
         return alone, reflex.CLEAR * limit, False
 

@@ -351,15 +351,20 @@ def test_an_imu_sample_that_is_stamped_ahead_hides_what_comes_after_it_for_a_ten
     assert taken_us[0] == 2_100_000 and len(taken_us) == 100_000 // INTERVAL_US
 
 
-@pytest.mark.parametrize("force_m_s2", [0.0, 40.0])
-def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_order_they_come(force_m_s2):
+@pytest.mark.parametrize(
+    ("force_m_s2", "turns_rad_s", "is_none"), [(0.0, 0.0, True), (40.0, 0.0, False), (0.0, 3.0, False)]
+)
+def test_a_velocity_is_confirmed_by_a_force_of_its_time_in_whichever_order_they_come_or_by_a_turn(
+    force_m_s2, turns_rad_s, is_none
+):
     # Given a vehicle that flies north, whose estimator takes a jump back, as of a hit that clipping hides whole
     config, rejected = CompanionConfig(), []
     # Nothing else is known, and there is no fence
     room: Any = SimpleNamespace(surfaces=lambda contact: (), inside=lambda contact_ned_m, goal_ned_m: goal_ned_m)
     reflex = Reflex(config, RecoveryConfig(restitution=0.2), config.settled)
     for us in range(INTERVAL_US, 3_600_000, INTERVAL_US):
-        samples: list[Sample] = [ImuSample(us, (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), ZERO)]
+        force, rates = (-force_m_s2 if us == 3_000_000 else 0.0, 0.0, -GRAVITY_M_S2), (0.0, 0.0, turns_rad_s)
+        samples: list[Sample] = [ImuSample(us, force, rates if us > 3_000_000 else ZERO)]
         if us % (5 * INTERVAL_US) == 0:
             place = (2e-6 * us, 0.0, -2.0)
             velocity = (1.0 if us == 3_000_000 else 2.0, 0.0, 1e-3 * (us // (5 * INTERVAL_US) % 2))
@@ -372,10 +377,10 @@ def test_a_velocity_and_a_force_of_one_time_confirm_each_other_in_whichever_orde
             shown = [reflex.newest.take(sample) for sample in samples if isinstance(sample, LocalPosition)]
             rejected += [progress for progress in shown if progress.is_rejected]
         reflex.follow(samples, 2.0, LandedState.IN_AIR)
-    # Then the jump alone was none, and with a force of the same time it was a hit
+    # Then the jump alone was none, and with a force of the same time or a turn it was a hit
     assert len(reflex.hits) == 1
     assert reflex.hits[0].estimator.start.velocity_ned_m_s[0] == pytest.approx(-0.2 * 2.0, abs=0.05)
-    assert bool(rejected) is (force_m_s2 == 0.0)
+    assert bool(rejected) is is_none
     # And velocities that it may have spoilt do not reject the next one
     source, first = reflex.monitor.estimator, reflex.hits[0]
     first.is_over, may_be_wrong_m_s = True, first.estimator.left_m_s

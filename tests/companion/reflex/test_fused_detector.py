@@ -432,6 +432,13 @@ def test_a_hits_first_sample_does_not_raise_what_it_must_reach_with_its_second()
     assert [i.sample_time_boot_us for i in graze.fly()] == [3_040_000]
 
 
+def test_a_sample_that_is_a_hit_alone_is_no_mean_with_the_weak_one_before_it():
+    hit = Flight(
+        lambda t: (0.0, {150: 8.0, 151: 20.0}.get((t - 500) // 20_000, 0.0), 0.0), noise=1.5, imu_every_us=20_000
+    )
+    assert [i.specific_force_frd_m_s2[1] for i in hit.fly()] == [pytest.approx(20.0, abs=3.0)]
+
+
 @pytest.mark.parametrize(("before_m_s2", "is_shown_twice"), [(1.0, False), (1.7, True)])
 def test_a_sample_that_almost_was_a_hit_shows_the_next_one_too(before_m_s2, is_shown_twice):
     hit = Flight(lambda t: (0.0, {750: before_m_s2, 751: 20.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=0.02)
