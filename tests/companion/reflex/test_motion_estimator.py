@@ -328,6 +328,12 @@ def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(a
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
 
 
+def test_the_thrust_of_a_vehicle_that_turns_counts_as_it_points_when_a_setpoint_has_reached_its_motors():
+    # Given a level one whose nose goes down at 2 rad/s: by 0.1 rad within 0.05 s
+    strapdown = Strapdown(time_boot_us=HIT_US, rates_frd_rad_s=(0.0, -2.0, 0.0))
+    assert reckoned().belief(strapdown).tilt_m_s2 == pytest.approx((0.98, 0.0, 0.0), abs=0.02)
+
+
 @pytest.mark.parametrize(
     ("heading_deg", "asked_deg"), [(10.0, 0.0), (-15.0, 0.0), (-120.0, -104.0), (120.0, 104.0), (350.0, 0.0)]
 )
