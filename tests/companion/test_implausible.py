@@ -8,7 +8,7 @@ import pytest
 
 from bench.fly.packets import made
 from companion import messages
-from companion.messages import ImuSample, LandedState, LocalPosition, Odometry, PositionSetpoint, PositionTarget
+from companion.messages import LandedState, LocalPosition, Odometry, PositionSetpoint, PositionTarget
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import VelocityFix
@@ -124,7 +124,7 @@ def test_velocities_reject_one_sample_whose_impulse_they_would_show(
     force_m_s2, noise_m_s, changed_m_s, across_m_s, is_none
 ):
     # 14 m/s^2 for 5 ms are 0.07 m/s; beside a noise of 0.1 m/s velocities say nothing of that, and of 0.3 m/s they do
-    earlier, noise = ImuSample(996_000, (0.0, 0.0, -9.8), STILL), random.Random(1)
+    noise = random.Random(1)
     # Given a vehicle that hovers, every 10 ms its velocity less the accelerometer's sum, which has all of the claim's
     less_m_s, heard = changed_m_s - 0.004 * force_m_s2, []
     for at_ms in range(800, 1160, 10):
@@ -132,7 +132,7 @@ def test_velocities_reject_one_sample_whose_impulse_they_would_show(
         east_m_s = 0.001 * (at_ms % 3) + (across_m_s if at_ms > 1000 else 0.0)
         heard.append(VelocityFix(at_ms * 1000, (north_m_s, east_m_s, 0.0), STILL))
     hypothesis = Hypothesis(
-        1_000_000, 996_000, 0.005 * force_m_s2, (1.0, 0.0, 0.0), force_m_s2, earlier, later_boot_us=1_004_000
+        1_000_000, 996_000, 0.005 * force_m_s2, (1.0, 0.0, 0.0), force_m_s2, 996_000, later_boot_us=1_004_000
     )
     assert hypothesis.is_rejected(heard, MotionHistory(), 0.03) is is_none
     # And while an earlier hit is corrected, which may hide as much, they reject nothing

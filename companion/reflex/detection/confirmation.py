@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median, stdev
 
-from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SHOWN_US
+from companion.messages import LocalPosition, Vector3
+from companion.motion.config import LONGEST_DELAY_US, SHOWN_US
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
 from companion.motion.vector import ZERO, along, minus, plus
@@ -30,17 +30,14 @@ class Hypothesis:
     change_m_s: float  # of the velocity
     away: Vector3  # its direction, local NED
     force_m_s2: float = 0.0  # the contact force per mass in the IMU sample
-    earlier: ImuSample | None = None  # the one before; None where a velocity shows the hit
+    earlier_boot_us: int | None = None  # time of the sample before; None where a velocity shows the hit
     left_m_s: float = 0.0  # by how much the vehicle's velocity may be wrong by an earlier hit
     later_boot_us: int | None = None  # time of the one after, once it has come
 
-    def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> bool:
-        """Take the newest IMU sample's time and rates (FRD); whether it is the first one after the hit and shows a rate
-        jump that no motor makes."""
-        if self.earlier is None or self.later_boot_us is not None or time_boot_us <= self.time_boot_us:
-            return False
-        self.later_boot_us, elapsed_s = time_boot_us, 1e-6 * (time_boot_us - self.earlier.time_boot_us)
-        return math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s) > MOTORS_RAD_S2 * elapsed_s
+    def follow(self, time_boot_us: int) -> None:
+        """Take the newest IMU sample's time."""
+        if self.later_boot_us is None and time_boot_us > self.time_boot_us:
+            self.later_boot_us = time_boot_us
 
     def is_rejected(self, fixes: Sequence[VelocityFix], history: MotionHistory, position_noise_m: float) -> bool:
         """Whether velocities show no impulse of this size, or positions no jump of the velocity.
@@ -49,7 +46,8 @@ class Hypothesis:
         """
         if 0.5 * self.change_m_s <= self.left_m_s:
             return False
-        return self._is_unmoved(fixes) or (self.earlier is None and self._stays_in_place(history, position_noise_m))
+        is_jump = self.earlier_boot_us is None
+        return self._is_unmoved(fixes) or (is_jump and self._stays_in_place(history, position_noise_m))
 
     def _is_unmoved(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether the velocities before and after show less than half of the change.
@@ -62,14 +60,14 @@ class Hypothesis:
         came = [fix.less_sum_m_s for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= SHOWN_US]
         if len(was) < 2 or len(came) < 2:
             return False
-        if self.earlier is not None:
+        if self.earlier_boot_us is not None:
             if self.later_boot_us is None:
                 return False
-            in_sum_m_s = self.force_m_s2 * 0.5e-6 * (self.later_boot_us - self.earlier.time_boot_us)
+            in_sum_m_s = self.force_m_s2 * 0.5e-6 * (self.later_boot_us - self.earlier_boot_us)
             sure = SURE * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         # The median: one of them may be forged. A jump that no sample showed fades from the sum: one velocity shows it.
         change = plus(minus(_median(came), _median(was)), in_sum_m_s, self.away)
-        shown = max if self.earlier is None else median
+        shown = max if self.earlier_boot_us is None else median
         shown_m_s, was_m_s = shown(self._along(came)), median(self._along(was))
         least_m_s = 0.5 * self.change_m_s
         is_unmoved = shown_m_s - was_m_s + in_sum_m_s < least_m_s
@@ -116,4 +114,6 @@ def hypothesis_of(
         return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away, left_m_s=left_m_s)
     if estimate.earlier is None:
         return None
-    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, estimate.earlier, left_m_s)
+    return Hypothesis(
+        hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, estimate.earlier.time_boot_us, left_m_s
+    )

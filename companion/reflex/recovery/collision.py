@@ -129,8 +129,8 @@ class Collision:
         is_larger = state.peak_specific_force_m_s2 > self.peak_specific_force_m_s2
         is_seen_again = is_in_contact and (is_larger or state.last_loud_boot_us > hit_us)
         if self.hypothesis is not None:
-            is_turned = self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
-            is_turned = is_turned or state.turn.value > state.turn.limit
+            self.hypothesis.follow(strapdown.time_boot_us)
+            is_turned = state.turn.value > state.turn.limit
             self.hypothesis = None if is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == hit_us:
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)

@@ -173,7 +173,7 @@ def test_a_silence_that_is_shorter_than_the_links_limit_ends_nothing_whatever_is
 def test_a_time_for_which_no_vehicle_holds_a_setpoint_is_refused():
     f = flying_in("mission")
     loss_s = f.companion.core.reflex.loss_s
-    for value in (-0.3, 1e9, math.nan):
+    for value in (-0.3, 70.0, 1e9, math.nan):
         f.vehicle.send(mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", value, mav.MAV_PARAM_TYPE_REAL32, 1, 0))
     f.run_for(0.1)
     assert f.companion.core.reflex.loss_s == loss_s

@@ -240,7 +240,7 @@ def test_it_is_not_handed_over_on_the_obstacle():
         (1.0, 2.0, "for 1 s"),
         (None, 2.0, "unknown time"),
         (math.inf, 2.0, "takes no thrust"),
-        (0.3, 0.1, "not known yet"),
+        (0.3, 0.3, "not known yet"),
     ],
 )
 def test_where_an_attitude_is_not_safe_the_plain_place_of_law_paper_is_sent(loss_s, learnt_s, word):

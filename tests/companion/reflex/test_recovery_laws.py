@@ -16,7 +16,7 @@ from companion.motion.rotation import body_to_ned
 from companion.motion.vector import ZERO, along, minus, plus
 from companion.reflex import config as set_to
 from companion.reflex.belief.motion_estimator import Belief
-from companion.reflex.config import LEAST_THRUST, MOST_CLIMB_M_S2, MOST_TILT_RAD, RecoveryConfig
+from companion.reflex.config import MOST_TILT_RAD, RecoveryConfig
 from companion.reflex.recovery.attitude_law import Lean, attitude_and_thrust, held_off, tilted, wanted
 from companion.reflex.recovery.laws import RECOVERY_LAWS
 from companion.reflex.surface import Contact, Surface, projected
@@ -216,13 +216,19 @@ def test_thrust_that_presses_on_a_surface_is_no_more_than_leads_off_it(off_m, ve
     attitude, pressing = attitude_and_thrust(asked, lean(belief, [near]))
     # Then its thrust is the projection of the force that is wanted, not what would carry it, or climb; and where a hit
     # has turned it onto the wall it presses by less than tips it over
-    leans, climbs_m_s2 = up_of(attitude), 0.0 if off_m == 0.0 else -MOST_CLIMB_M_S2
-    level_m_s2 = leans[0] / -leans[2] * (GRAVITY_M_S2 + MOST_CLIMB_M_S2)
+    leans, climbs_m_s2 = up_of(attitude), 0.0 if off_m == 0.0 else -4.0
+    level_m_s2 = leans[0] / -leans[2] * (GRAVITY_M_S2 + 4.0)
     projection = along((level_m_s2, 0.0, climbs_m_s2 - GRAVITY_M_S2), up)
     assert pressing == pytest.approx(min(projection, presses_m_s2 / math.sin(into_rad)) / FULL_M_S2)
     # And in front of a wall that is far it is what carries it and climbs
     _, lifting = attitude_and_thrust(asked, lean(belief, [FAR]))
-    assert lifting == pytest.approx((GRAVITY_M_S2 + MOST_CLIMB_M_S2) / FULL_M_S2)
+    assert lifting == pytest.approx((GRAVITY_M_S2 + 4.0) / FULL_M_S2)
+
+
+@pytest.mark.parametrize(("low_m", "climbs_m_s", "climbs_m_s2"), [(0.1, 0.0, 1.6), (0.0, 0.2, -1.6)])
+def test_it_comes_back_to_its_height_as_a_critically_damped_loop_of_4_rad_s(low_m, climbs_m_s, climbs_m_s2):
+    belief = Belief(plus(HERE, low_m, (0.0, 0.0, 1.0)), (0.0, 0.0, -climbs_m_s))
+    assert wanted(belief, (), HERE[2]) == pytest.approx((0.0, 0.0, -climbs_m_s2))
 
 
 def test_under_a_ceiling_that_is_not_quite_level_it_is_carried_on():
@@ -256,6 +262,11 @@ def test_a_vehicle_that_turns_leans_by_what_px4_leaves_of_its_thrust_for_the_tur
     assert -up_of(attitude)[2] == pytest.approx(upright)
 
 
+def test_a_weak_vehicle_leans_by_what_leaves_it_a_tenth_more_than_carries_it():
+    attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(Belief(HERE, ZERO), full_m_s2=13.0))
+    assert -up_of(attitude)[2] == pytest.approx(1.1 * GRAVITY_M_S2 / 13.0)
+
+
 def test_a_vehicle_that_turns_by_two_radians_within_its_attitudes_lag_leans_half_as_much():
     belief = Belief(HERE, ZERO, yaw_rate_rad_s=-2.0 / set_to.LEAD_S)
     attitude, _ = attitude_and_thrust((9.0, 0.0, 0.0), lean(belief, full_m_s2=30.0))
@@ -287,4 +298,4 @@ def test_whatever_is_asked_for_the_attitude_is_upright_and_the_thrust_one_that_t
     attitude, thrust = attitude_and_thrust(acceleration, lean(belief, [WALL], full_m_s2))
     assert math.hypot(*attitude) == pytest.approx(1.0)
     assert -up_of(attitude)[2] >= math.cos(MOST_TILT_RAD) - 1e-9
-    assert LEAST_THRUST <= thrust <= 1.0
+    assert 0.12 <= thrust <= 1.0
