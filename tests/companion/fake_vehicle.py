@@ -106,7 +106,6 @@ class FakeVehicle:
     # --- the wire
 
     def step(self, received: bytes) -> bytes:
-        self.out = b""
         if not self.deaf:
             for message in self.rx.parse_buffer(received) or []:
                 self.hear(message)
@@ -114,7 +113,8 @@ class FakeVehicle:
         self.ticks += 1
         self.time_us += INTERVAL_US
         self.stream()
-        return b"" if self.silent else self.out
+        sent, self.out = self.out, b""
+        return b"" if self.silent else sent
 
     def send(self, message) -> None:
         self.out += bytes(message.pack(self.tx))
