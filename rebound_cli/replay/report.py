@@ -7,14 +7,20 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.detection.detector import Evidence, ImpactKind
+from companion.reflex.detection.detector import ImpactKind
 from companion.reflex.surface import Normal
 from rebound_cli.logs.log import WANTED, Log, clipping_text
 from rebound_cli.replay.recording import Recording, reproduce
 from rebound_cli.replay.watching import Finding, Findings, watch_log
 
 _WIDTH = 110
-_SEEN_BY = {Evidence.VELOCITY_JUMP: "a velocity that jumped", Evidence.RATE_JUMP: "a turn"}
+# What each sign is called, in which unit and to how many digits.
+SIGNS = {
+    "side": ("Push sideways", "m/s²", 1),
+    "beyond": ("Push along the thrust", "m/s² beyond the propellers", 1),
+    "turn": ("Turn at once", "rad/s", 1),
+    "jump": ("Velocity jump", "m/s that no sample shows", 2),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +100,22 @@ def _verdict(replay: Replay) -> str:
 
 def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     what = "CRASH" if finding.is_crash else "HIT" if finding.is_collision else "contact, no collision"
-    impact = finding.first.impact
-    force = f"{impact.size_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
-    yield f"{what}: {kind_text(finding)}, seen by {_SEEN_BY.get(impact.evidence, force)}"
+    yield f"{what}: {kind_text(finding)}, seen by {_seen_by(replay, finding)}"
     yield from (
         f"{name.lower()}: {text}" for name, text in impact_facts(finding, finding.final.normal, replay.log.seconds)
     )
+
+
+def _seen_by(replay: Replay, finding: Finding) -> str:
+    """The innovation that was largest beside its limit, as the detector published it; where it did not, the force."""
+    impact, shown = finding.first.impact, replay.findings.listener.shown
+    tested = shown[impact.sample_time_boot_us][0] if impact.sample_time_boot_us in shown else None
+    if tested is None or math.isnan(tested.ratio):
+        return f"{impact.size_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
+    sign = max(tested.signs, key=tested.ratio_of)
+    name, unit, digits = SIGNS[sign]
+    value, limit = tested.signs[sign]
+    return f"{name.lower()}: {value:.{digits}f} {unit}, a hit from {limit:.{digits}f} on"
 
 
 def impact_facts(finding: Finding, normal: Normal, seconds: Callable[[float], float]) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from companion.reflex.config import LONGEST_STEP_US
 from companion.reflex.detection.detector import Phase
-from rebound_cli.replay.listening import PHASES, Numbers
+from rebound_cli.replay.listening import FORCES, PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
 from rebound_cli.report.series import FORCE_M_S2, PLACES, RATIO, TIME_S, Columns, of_truth, series, times
@@ -115,13 +116,13 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     near_s = np.array([flight.seconds(moment.at_us) for moment in moments])
     most = _ROWS + round(_ROWS_PER_S * flight.ended_s)
     tested = _tested_columns(flight)
-    loud = np.fmax(tested["side"] / tested["side_threshold"], tested["beyond"] / tested["beyond_threshold"])
+    ratio: Floats = reduce(np.fmax, (tested[sign] / tested[f"{sign}_threshold"] for sign in FORCES))
     first_us = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
     columns = series(log, flight.started_at_us)
     columns["imu"] = _on_both_clocks(columns["imu"], log.imu_time_boot_us - first_us)
     columns["imu"] |= {name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()}
     watches = tested["phase"] >= PHASES.index(Phase.ARMED)
-    columns["imu"]["ratio"] = (np.where(watches, loud, np.nan), RATIO)
+    columns["imu"]["ratio"] = (np.where(watches, ratio, np.nan), RATIO)
     jumps = flight.findings.listener.velocities.all()
     columns["jump"] = times(heard_at_us(flight, jumps.time_boot_us), flight.started_at_us) | {
         "ratio": (np.where(jumps.phase >= PHASES.index(Phase.ARMED), jumps.ratio, np.nan), RATIO)
@@ -130,7 +131,7 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     if truth is not None and truth.series:
         told_us = truth.told_us(truth.series["time_boot_us"]) - first_us
         columns["truth"] = _on_both_clocks(of_truth(truth, flight.started_at_us), told_us)
-    return {name: _packed(table, loud if name == "imu" else None, near_s, most) for name, table in columns.items()}
+    return {name: _packed(table, ratio if name == "imu" else None, near_s, most) for name, table in columns.items()}
 
 
 def _on_both_clocks(columns: Columns, boot_us: Floats) -> Columns:

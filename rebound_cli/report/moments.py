@@ -15,7 +15,7 @@ from companion.motion.config import SHOWN_US
 from companion.reflex.detection.detector import ImpactKind, Phase
 from companion.reflex.surface import Normal
 from rebound_cli.replay.listening import PHASES, Tested
-from rebound_cli.replay.report import bearing, impact_facts, kind_text, speed_text
+from rebound_cli.replay.report import SIGNS, bearing, impact_facts, kind_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import impact_text
@@ -111,10 +111,10 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     if tested is not None:
         yield _hand_text(flight, finding, may_be_hand)
     kind = finding.final.impact.kind
-    verdict = "a collision, to be recovered from" if finding.is_collision else "nothing to recover from"
-    yield f"Verdict: {kind.value}, {verdict}."
+    is_hit = finding.is_collision and not finding.is_crash
+    yield f"Verdict: {kind.value}, {'a collision, to be recovered from' if is_hit else 'nothing to recover from'}."
     if finding.final.is_lower_bound:
-        yield "The sensor's range was too small for it, or part of it was not seen: it was at least as hard as stated."
+        yield "Part of it was not measured, such as beyond the sensor's range: it was at least as hard as stated."
     taken_back_us = flight.taken_back_us(finding)
     if taken_back_us is not None:
         yield f"Taken back {(taken_back_us - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
@@ -122,18 +122,9 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
         yield "The simulator: a false alarm, no new contact."
 
 
-# What each sign is called, in which unit and to how many digits.
-_SIGNS = {
-    "side": ("Push sideways", "m/s²", 1),
-    "beyond": ("Push along the thrust", "m/s² beyond the propellers", 1),
-    "turn": ("Turn at once", "rad/s", 1),
-    "jump": ("Velocity jump", "m/s that no sample shows", 2),
-}
-
-
 def _signs(tested: Tested) -> Iterator[str]:
     for sign, (value, limit) in tested.signs.items():
-        name, unit, digits = _SIGNS[sign]
+        name, unit, digits = SIGNS[sign]
         if value < 0.0:
             yield f"{name}: within what the propellers can do: says nothing."
         elif not math.isnan(value):

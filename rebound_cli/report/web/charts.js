@@ -167,8 +167,8 @@ const OVERVIEWS = [
   ] },
   // What a contact makes leaves the picture: what came near to one is looked for.
   { title: "How near to a hit, while the detector was on", unit: "thresholds", top: 1.5, level: [1, "a hit from here on"], lines: [
-    { table: "imu", column: "ratio", label: "push over threshold", colour: "blue" },
-    { table: "jump", column: "ratio", label: "velocity jump over threshold", colour: "orange", held: flight.jump_held_s },
+    { table: "imu", column: "ratio", label: "push or turn over its threshold", colour: "blue" },
+    { table: "jump", column: "ratio", label: "velocity jump over its threshold", colour: "orange", held: flight.jump_held_s },
   ] },
   { title: "Specific force sideways", unit: "m/s²", lines: [
     { table: "force", column: "peak", label: "largest in a tenth of a second", colour: "blue" },

@@ -202,7 +202,7 @@ def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
             one = one._replace(sample=replace(one.sample, velocity_ned_m_s=velocity))
         heard.append(one)
     shown = of_a_log(log := replace(log, heard=tuple(heard)))
-    assert "HIT: wall, seen by a velocity that jumped" in report_text(replay_log(log, CompanionConfig()))
+    assert "HIT: wall, seen by velocity jump: " in report_text(replay_log(log, CompanionConfig()))
     (moment,) = (moment for moment in moments_of(shown) if moment.kind == "hit")
     (told,) = (reason for reason in moment.reasons if reason.startswith("Velocity jump: 0.6"))
     assert told.endswith("speaks for a contact.") and not any("Push" in reason for reason in moment.reasons)
