@@ -178,6 +178,8 @@ AWAY_M_S2 = 1.5
 # PX4's failure detector: FD_FAIL_R and FD_FAIL_P, 60 degrees. It waits for 0.3 s (FD_FAIL_R_TTRI); a vehicle that a hit
 # has turned over is upright again within half a second, or never. ArduPilot waits for 2 s (crash_check.cpp).
 TIPPED_RAD, TIPPED_US = 1.05, 500_000
+# Beyond it no thrust, which acts along body z, carries a vehicle, and one at rest does not fly.
+UPRIGHT_COSINE = math.cos(TIPPED_RAD)
 # So low and at rest for so long, in a recovery that asks for more: it is on the floor. A vehicle is 0.3 m wide.
 LOW_M, LOW_US = 0.3, 1_000_000
 # It lies: twice as long.
@@ -185,8 +187,6 @@ LIES_US = 2 * LOW_US
 # Largest difference of the mean specific force from gravity, and largest rate, of a vehicle that lies while its motors
 # shake it; the mean is over about twenty samples.
 STILL_M_S2, STILL_RAD_S, LYING_SHARE = 1.0, 0.3, 0.05
-# Thrust acts along body z. A vehicle at rest whose weight is carried across it, or from above, does not fly.
-CARRIED_SHARE = 0.5
 
 # --- half-spaces
 # Standard deviation of a surface's position and of the hit's: arms fold, and position estimates drift.
@@ -200,19 +200,15 @@ ROUNDS = 5
 # Time constant of the acceleration's low-pass filter: a few samples of the slowest stream, against vibration. A contact
 # counts until as long after its last sample: it may go on, or the filtered motion does not contain it yet.
 SMOOTHED_S = 0.05
-# Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
-LEAST_UPRIGHT_COSINE = 0.5
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
 CORRECTION_DELAY_S = np.linspace(0.04, 0.22, 4)
 CORRECTION_RAD_S = np.geomspace(2.4, 9.2, 5)
-CORRECTION_DAMPING = (0.5, 0.67, 0.85)
+CORRECTION_DAMPING = 0.67
 # The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
 # Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
 MODEL_ERROR = 0.03
-# The logistic function with this factor differs from the normal distribution's by less than 1 %.
-LOGISTIC = 1.702
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD = 0.3

@@ -19,15 +19,15 @@ from companion.reflex.surface import MotionState
 
 Floats = npt.NDArray[np.float64]
 
-# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping. The last: nothing is missing.
-_SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)])
-_LATE_S, _RAD_S, _DAMPING = np.append(_SOME, _SOME[-1:], axis=0).T
-_SWING, _SLOW = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S
+# Hypotheses of the estimator's correction: delay in s, frequency in rad/s. The last: nothing is missing.
+_SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S)])
+_LATE_S, _RAD_S = np.append(_SOME, _SOME[-1:], axis=0).T
+_SWING, _SLOW = 2.0 * reflex.CORRECTION_DAMPING * _RAD_S, reflex.TILT_PER_S
 # The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
 # p = delay, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
 # s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c). By Laplace p = s (delay s + 1) / (s^3 + k s^2 + h s + m).
 _K, _H = _SWING + _SLOW, _RAD_S**2 + _SWING * _SLOW
-_TURN_RAD_S = 1j * _RAD_S * np.sqrt(1.0 - _DAMPING**2)
+_TURN_RAD_S = 1j * _RAD_S * math.sqrt(1.0 - reflex.CORRECTION_DAMPING**2)
 _POLES = np.array([_TURN_RAD_S - 0.5 * _SWING, -_TURN_RAD_S - 0.5 * _SWING, np.full_like(_SWING, -_SLOW)])
 _WAYS = _POLES * (_LATE_S * _POLES + 1.0) / (3.0 * _POLES**2 + 2.0 * _K * _POLES + _H)
 _MODES = np.array([_WAYS, (_POLES + _K) * _WAYS])
@@ -115,7 +115,8 @@ class FilterBank:
         velocity, variance = self.state[..., 1], self.covariance[:, 1, 1]
         off_m_s = velocity @ np.array(normal) - along_m_s
         spread2 = variance + error_rad**2 * (velocity**2).sum(axis=1)
-        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(0.5 * reflex.LOGISTIC * off_m_s / np.sqrt(spread2)), 1e-9)
+        # As steep at zero as the normal distribution's.
+        self.leaves = np.maximum(0.5 + 0.5 * np.tanh(math.sqrt(2.0 / math.pi) * off_m_s / np.sqrt(spread2)), 1e-9)
 
     def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
         """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.

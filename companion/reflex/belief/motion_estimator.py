@@ -187,7 +187,7 @@ class MotionEstimator:
         motion = self.motion
         ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, reflex.TILT_AHEAD_S)
         n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
-        upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
+        upright = max(-d / GRAVITY_M_S2, reflex.UPRIGHT_COSINE)
         return Belief(
             motion.position_ned_m,
             motion.velocity_ned_m_s,

@@ -39,7 +39,7 @@ class CrashWatch:
                     is_still = self.is_near and math.hypot(*sample.velocity_ned_m_s) < reflex.RESTS_M_S
                     self.low.update(is_still, sample.time_boot_us)
                     is_weight = abs(math.hypot(*self.force_frd_m_s2) - GRAVITY_M_S2) < reflex.STILL_M_S2
-                    self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.CARRIED_SHARE * GRAVITY_M_S2
+                    self.is_carried = is_weight and -self.force_frd_m_s2[2] < reflex.UPRIGHT_COSINE * GRAVITY_M_S2
                     turns = math.hypot(*self.rates_frd_rad_s) > reflex.STILL_RAD_S
                     lies = self.is_carried or landed is LandedState.ON_GROUND
                     self.lying.update(is_still and lies and not turns, sample.time_boot_us)

@@ -133,7 +133,7 @@ def _thrust_m_s2(asked_m_s2: Vector3, lean: Lean) -> float:
     tilt_n, tilt_e, _ = lean.belief.tilt_m_s2
     ahead = unit((tilt_n, tilt_e, -GRAVITY_M_S2))
     near = [one for one in lean.surfaces if one.off_m(place) < one.distance_m and along(ahead, one.normal_ned) < 0.0]
-    if not near and -up[2] >= reflex.LEAST_UPRIGHT_COSINE:
+    if not near and -up[2] >= reflex.UPRIGHT_COSINE:
         return (GRAVITY_M_S2 - d) / -up[2]
     # One that lies on a surface does not climb: the thrust for that presses it on.
     lies = any(one.off_m(place) <= 0.0 for one in near)

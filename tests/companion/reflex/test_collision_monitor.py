@@ -279,7 +279,7 @@ def test_a_jump_beyond_what_is_left_of_a_hit_is_another(speed, later_s, left_m_s
 def test_what_the_next_hit_changes_is_not_taken_for_what_is_left_of_the_last():
     """A belief that has heard the next hit's first velocity takes a part of it for an error of the estimate."""
     left_m_s = property(lambda found: 0.6 + math.hypot(*found.velocity_error_m_s))
-    impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 0.9 * (since_s >= 1.5), left_m_s=left_m_s)
+    impacts, _, _ = after_a_hit(4.0, 120.0, 3, lambda since_s: 1.1 * (since_s >= 1.5), left_m_s=left_m_s)
     assert len(impacts) == 2
 
 
