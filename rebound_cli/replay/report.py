@@ -108,8 +108,8 @@ def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
 
 def _seen_by(replay: Replay, finding: Finding) -> str:
     """The innovation that was largest beside its limit, as the detector published it; where it did not, the force."""
-    impact, shown = finding.first.impact, replay.findings.listener.shown
-    tested = shown[impact.sample_time_boot_us][0] if impact.sample_time_boot_us in shown else None
+    impact = finding.first.impact
+    tested, _ = replay.findings.listener.shown.get(impact.sample_time_boot_us, (None, False))
     if tested is None or math.isnan(tested.ratio):
         return f"{impact.size_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
     sign = max(tested.signs, key=tested.ratio_of)

@@ -8,7 +8,6 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy.typing as npt
 
 from companion.reflex.config import LONGEST_STEP_US
 from companion.reflex.detection.detector import Phase
-from rebound_cli.replay.listening import FORCES, PHASES, Numbers
+from rebound_cli.replay.listening import PHASES, Numbers
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.scene import modes, obstacles, recovering, rounded_s, surfaces, vehicle
 from rebound_cli.report.series import FORCE_M_S2, PLACES, RATIO, TIME_S, Columns, of_truth, series, times
@@ -116,7 +115,7 @@ def _tables(flight: ShownFlight, moments: Sequence[Moment]) -> dict[str, Any]:
     near_s = np.array([flight.seconds(moment.at_us) for moment in moments])
     most = _ROWS + round(_ROWS_PER_S * flight.ended_s)
     tested = _tested_columns(flight)
-    ratio: Floats = reduce(np.fmax, (tested[sign] / tested[f"{sign}_threshold"] for sign in FORCES))
+    ratio = tested.pop("ratio")
     first_us = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
     columns = series(log, flight.started_at_us)
     columns["imu"] = _on_both_clocks(columns["imu"], log.imu_time_boot_us - first_us)
@@ -145,7 +144,7 @@ def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     # Of a stamp that came twice, after a reboot, the last.
     row_of = {stamp_us: row for row, stamp_us in enumerate(np.ravel(tested.time_boot_us).tolist())}
     rows = [row_of.get(boot_us, -1) for boot_us in flight.log.imu_time_boot_us.tolist()]
-    columns = {"phase": tested.phase}
+    columns = {"phase": tested.phase, "ratio": tested.ratio}
     for sign, (value, limit) in tested.signs.items():
         columns |= {sign: value, f"{sign}_threshold": limit}
     return {name: np.append(column, np.nan)[rows] for name, column in columns.items()}

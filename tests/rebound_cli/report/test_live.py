@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 from companion.errors import ReboundError
-from companion.messages import Attitude, LocalPosition
+from companion.messages import Attitude, ExtendedState, ImuSample, LandedState, LocalPosition
 from companion.mission.config import CompanionConfig
 from rebound_cli.live.console import Console
+from rebound_cli.logs.log import LoggedSample
 from rebound_cli.replay.report import replay_log, report_text
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report import showing
@@ -29,7 +30,7 @@ from rebound_cli.report.page import page
 from rebound_cli.report.shown_flight import replayed_flight
 from rebound_cli.report.tail import COLUMNS, Tail
 from rebound_cli.results.flight_log import read_flight_log
-from tests.rebound_cli.replay.flying import HIT_US, flight
+from tests.rebound_cli.replay.flying import HIT_US, beat, flight
 from tests.rebound_cli.report.test_page import Opened
 from tests.test_structure import alone
 
@@ -210,6 +211,39 @@ def test_a_hit_between_the_samples_is_told_by_the_velocity_that_shows_it():
     jumps = shown.findings.listener.velocities.all()
     _, limits_m_s = jumps.signs["jump"]
     assert np.count_nonzero(jumps.ratio > 1.0) == 1 and limits_m_s.min() >= 0.12
+
+
+def test_a_push_is_told_with_the_innovation_that_the_detector_published():
+    replay = replay_log(flight(), CompanionConfig())
+    ((tested, _),) = replay.findings.listener.shown.values()
+    value, limit = tested.signs["side"]
+    assert f"HIT: wall, seen by push sideways: {value:.1f} m/s², a hit from {limit:.1f} on" in report_text(replay)
+
+
+def test_a_turn_is_told_as_one_and_is_near_to_a_hit():
+    # Given a vehicle that turns with 3 rad/s from one sample to the next, and shows no force
+    heard, level = [], (1.0, 0.0, 0.0, 0.0)
+    for one in flight(hit_us=None).heard:
+        if isinstance(one.sample, ImuSample) and one.at_us >= HIT_US:
+            one = one._replace(sample=replace(one.sample, angular_velocity_frd_rad_s=(0.0, 0.0, 3.0)))
+        if isinstance(one.sample, LocalPosition):
+            heard.append(one._replace(sample=Attitude(one.at_us, level)))
+        heard.append(one)
+    replay = replay_log(replace(flight(), heard=tuple(heard)), CompanionConfig())
+    assert "HIT: wall, seen by turn at once: 3.0 rad/s, a hit from 1.2 on" in report_text(replay)
+    # Then the chart of how near it came to a hit reaches that
+    ratios = Opened(page(replayed_flight(replay))).table("imu")["ratio"]
+    assert np.nanmax(ratios) == pytest.approx(3.0 / 1.2, abs=0.1)
+
+
+def test_nothing_recovers_from_a_crash():
+    # Given a vehicle whose motors stop in the air, and that lies on its back soon after
+    log = flight(push_m_s2=60.0)
+    killed = [LoggedSample(HIT_US - 100_000, each) for each in (beat(False), ExtendedState(LandedState.ON_GROUND))]
+    turned = [LoggedSample(us, Attitude(us, (0.0, 1.0, 0.0, 0.0))) for us in range(HIT_US - 50_000, 10**7, 50_000)]
+    shown = of_a_log(replace(log, heard=tuple(sorted((*log.heard, *killed, *turned), key=lambda one: one.at_us))))
+    reasons = [reason for moment in moments_of(shown) for reason in moment.reasons if reason.startswith("Verdict")]
+    assert "Verdict: crash, nothing to recover from." in reasons
 
 
 def test_what_the_simulator_knows_and_nobody_saw_is_told_with_why(wall):
