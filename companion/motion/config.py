@@ -70,11 +70,13 @@ EARTH_M = 6_371_000.0
 # Delay of a satellite receiver's velocity: PX4's default EKF2_GPS_DELAY; the receivers that ArduPilot knows have 0.1 to
 # 0.22 s (AP_GPS's get_lag), a simulated one none. Then its standard deviation, and the longest.
 RECEIVER_DELAY_S, RECEIVER_SPREAD_S, RECEIVER_LATEST_S = 0.11, 0.06, 0.3
-# Receivers filter their velocities: ten of them, or a second, have the same error.
+# Receivers filter what they measure: ten of them, or a second, have the same error.
 RECEIVER_REPEATS = 10.0
 # Standard deviation of its noise before it is learnt: PX4's EKF2_GPS_V_NOISE. Not below twice the 0.05 m/s of u-blox's
 # data sheets.
 DOPPLER_M_S, FINEST_DOPPLER_M_S = 0.3, 0.1
+# Standard deviation of its place before that is learnt: PX4's EKF2_GPS_P_NOISE.
+RECEIVER_PLACE_M = 0.5
 # Standard deviations of the delay by which a velocity is taken for older, so that none from before a hit counts.
 CERTAIN = 2.0
 

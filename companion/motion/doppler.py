@@ -12,11 +12,16 @@ How far its place is from the vehicle's own is learnt in free flight, too.
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
 from companion.messages import GpsFix, LocalPosition, Vector3
 from companion.motion import config as numbers
 from companion.motion.slope import Slope
 from companion.motion.strapdown import Strapdown, VelocityFix
 from companion.motion.vector import ZERO, flat, limited, minus, plus, towards
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(slots=True)
@@ -38,6 +43,7 @@ class Doppler:
         )
     )
     place_ned_m: Vector3 | None = None  # horizontal, as of then; None until it is known beside the vehicle's own
+    place_variance_m2: float = numbers.RECEIVER_PLACE_M**2
     _first: GpsFix | None = None  # where its places are counted from
     _off_m: Vector3 | None = None  # the vehicle's own place less the receiver's
 
@@ -56,8 +62,9 @@ class Doppler:
         place = plus(self._counted_m(sample), 0.5 * self.late_s, plus((n, e, 0.0), 1.0, self.velocity_ned_m_s))
         if is_free and own is not None:
             since_s = 1e-6 * (strapdown.time_boot_us - own.time_boot_us)
-            off = minus(plus(own.position_ned_m, since_s, own.velocity_ned_m_s), place)
-            self._off_m = off if self._off_m is None else towards(self._off_m, off, 1.0 / self.known)
+            off = flat(minus(plus(own.position_ned_m, since_s, own.velocity_ned_m_s), place))
+            mean = self._off_m = off if self._off_m is None else towards(self._off_m, off, 1.0 / self.known)
+            self.place_variance_m2 += (0.5 * math.dist(off, mean) ** 2 - self.place_variance_m2) / self.known
         self.place_ned_m = None if self._off_m is None else plus(place, 1.0, self._off_m)
 
     def _counted_m(self, sample: GpsFix) -> Vector3:
@@ -88,51 +95,65 @@ class Doppler:
         self.variance_m2_s2 += (0.5 * math.hypot(*noise) ** 2 - self.variance_m2_s2) / self.known
 
 
-@dataclass(slots=True)
-class MeasuredVelocity:
-    """Kalman filter of the horizontal velocity v and of the acceleration b that the accelerometer does not show, as its
-    attitude is wrong: v' = a + b. A velocity that was carried on by the accelerometer over its delay d is v - d b.
-    Changed only by its methods; local NED, SI, the vehicle's boot clock.
+class MeasuredMotion:
+    """Kalman filter of the horizontal place x, the velocity v and the acceleration b that the accelerometer does not
+    show, as its attitude is wrong: x' = v, v' = a + b. A velocity that was carried on by the accelerometer over its
+    delay d is v - d b.
+
+    The state (3, 2) is x, v, b north and east; its covariance (3, 3) is that of either. Changed only by its methods;
+    local NED, SI, the vehicle's boot clock. `taken_boot_us`: the newest of its velocities was measured later than this.
     """
 
-    time_boot_us: int
-    summed_m_s: Vector3  # the accelerometer's integral up to its time
-    velocity_ned_m_s: Vector3
-    variance_m2_s2: float  # of v on an axis
-    taken_boot_us: int  # the newest of its velocities was measured later than this
-    unseen_m_s2: Vector3 = ZERO
-    both_m2_s3: float = 0.0  # covariance of v and b
-    unseen_variance_m2_s4: float = numbers.LEVEL_SPREAD_M_S2**2
+    def __init__(
+        self, time_boot_us: int, place_ned_m: Vector3, velocity_ned_m_s: Vector3, spreads: tuple[float, float]
+    ) -> None:
+        """`spreads`: standard deviations of place and velocity then."""
+        self.time_boot_us = self.taken_boot_us = time_boot_us
+        self._summed_m_s, self.state = ZERO, np.array([place_ned_m[:2], velocity_ned_m_s[:2], (0.0, 0.0)])
+        self.covariance = np.diag(np.square([*spreads, numbers.LEVEL_SPREAD_M_S2]))
 
     def predict(self, time_boot_us: int, summed_m_s: Vector3) -> None:
-        """Up to a time, with the accelerometer's integral until then."""
-        elapsed_s = 1e-6 * (time_boot_us - self.time_boot_us)
-        faster = plus(minus(summed_m_s, self.summed_m_s), elapsed_s, self.unseen_m_s2)
-        self.velocity_ned_m_s = plus(self.velocity_ned_m_s, 1.0, faster)
-        self.variance_m2_s2 += elapsed_s * (
-            2.0 * self.both_m2_s3 + elapsed_s * self.unseen_variance_m2_s4 + numbers.DRIFT_M2_S3
-        )
-        self.both_m2_s3 += elapsed_s * self.unseen_variance_m2_s4
-        self.unseen_variance_m2_s4 += numbers.LEVEL_DRIFT_M2_S5 * elapsed_s
-        self.time_boot_us, self.summed_m_s = time_boot_us, summed_m_s
+        """Up to a time, with the accelerometer's integral from the beginning until then."""
+        elapsed_s, added = 1e-6 * (time_boot_us - self.time_boot_us), minus(summed_m_s, self._summed_m_s)
+        leads = np.array([[1.0, elapsed_s, 0.5 * elapsed_s**2], [0.0, 1.0, elapsed_s], [0.0, 0.0, 1.0]])
+        self.state = leads @ self.state + np.outer((0.5 * elapsed_s, 1.0, 0.0), added[:2])
+        spread = elapsed_s * np.diag((0.0, numbers.DRIFT_M2_S3, numbers.LEVEL_DRIFT_M2_S5))
+        self.covariance = leads @ self.covariance @ leads.T + spread
+        self.time_boot_us, self._summed_m_s = time_boot_us, summed_m_s
 
     def update(self, doppler: Doppler, was_odd: bool) -> bool:
-        """Take a receiver's velocity; whether it is beyond belief, and left out unless the last one was, too."""
-        late_s = doppler.late_s
-        innovation = flat(plus(minus(doppler.velocity_ned_m_s, self.velocity_ned_m_s), late_s, self.unseen_m_s2))
-        with_v = self.variance_m2_s2 - late_s * self.both_m2_s3
-        with_b = self.both_m2_s3 - late_s * self.unseen_variance_m2_s4
+        """Take a receiver's velocity and place; whether the velocity is beyond belief, and both are left out unless the
+        last one was, too."""
         # No receiver is better than the best.
-        variance = with_v - late_s * with_b + max(doppler.variance_m2_s2, numbers.FINEST_DOPPLER_M_S**2)
-        is_odd = math.hypot(*innovation) / math.sqrt(variance) > numbers.GATE
+        noise_m2_s2 = max(doppler.variance_m2_s2, numbers.FINEST_DOPPLER_M_S**2)
+        row = np.array((0.0, 1.0, -doppler.late_s))
+        innovation, variance = self._innovation(row, doppler.velocity_ned_m_s, noise_m2_s2)
+        is_odd = math.hypot(*innovation) > numbers.GATE * math.sqrt(variance)
         if was_odd or not is_odd:
-            self.velocity_ned_m_s = plus(self.velocity_ned_m_s, with_v / variance, innovation)
-            self.unseen_m_s2 = plus(self.unseen_m_s2, with_b / variance, innovation)
-            self.variance_m2_s2 -= with_v * with_v / variance
-            self.both_m2_s3 -= with_v * with_b / variance
-            self.unseen_variance_m2_s4 -= with_b * with_b / variance
+            self._correct(row, innovation, variance)
+            if doppler.place_ned_m is not None:
+                row = np.array((1.0, 0.0, 0.0))
+                noise_m2 = numbers.RECEIVER_REPEATS * doppler.place_variance_m2
+                off_m, variance = self._innovation(row, doppler.place_ned_m, noise_m2)
+                self._correct(row, limited(off_m, numbers.GATE * math.sqrt(variance)), variance)
             self.taken_boot_us = doppler.taken_boot_us
         return is_odd
+
+    def _innovation(self, row: Floats, measured: Vector3, noise: float) -> tuple[Vector3, float]:
+        """The innovation of a measured sum of the state, and its variance."""
+        n, e = (measured[:2] - row @ self.state).tolist()
+        return (n, e, 0.0), float(row @ self.covariance @ row) + noise
+
+    def _correct(self, row: Floats, innovation: Vector3, variance: float) -> None:
+        gain = self.covariance @ row / variance
+        self.state = self.state + np.outer(gain, innovation[:2])
+        self.covariance = self.covariance - variance * np.outer(gain, gain)
+
+    @property
+    def unseen_m_s2(self) -> Vector3:
+        """b."""
+        n, e = self.state[2].tolist()
+        return (n, e, 0.0)
 
 
 def _faster_by(strapdown: Strapdown, since_s: float) -> Vector3 | None:

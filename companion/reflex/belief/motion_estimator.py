@@ -12,18 +12,18 @@ weighted by the likelihood of its innovations (Magill 1965). Before the first re
 
 import math
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass, field, replace
+from dataclasses import InitVar, dataclass, field
 
 import numpy as np
 
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion import config as numbers
 from companion.motion.config import GRAVITY_M_S2, SAME_M_S
-from companion.motion.doppler import Doppler, MeasuredVelocity
+from companion.motion.doppler import Doppler, MeasuredMotion
 from companion.motion.rotation import body_to_ned, swept_ned, turned
 from companion.motion.settling import Lasting
 from companion.motion.strapdown import LEVEL, Strapdown
-from companion.motion.vector import ZERO, along, flat, limited, minus, plus, split, towards
+from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards
 from companion.reflex import config as reflex
 from companion.reflex.belief.filter_bank import FilterBank, error_response
 from companion.reflex.surface import Contact, MotionState, Normal, away_from
@@ -81,7 +81,7 @@ class MotionEstimator:
     _released_m_s: Vector3 = ZERO  # the integral up to the contact's last sample
     _time_boot_us: int = field(init=False)  # of the newest sample of the accelerometer
     _swings_m_s: float = 0.0  # standard deviation of its further swing, by the bank
-    _measured: MeasuredVelocity | None = None  # by a receiver, since the contact's last sample
+    _measured: MeasuredMotion | None = None  # by a receiver, since the contact's last sample
     _was_odd: bool = False  # whether its last velocity was beyond belief: a second one counts
     _has_agreed: bool = False  # with the measured one, by itself
     _same: Lasting = field(default_factory=Lasting)  # for how long the reported velocity has been the measured one
@@ -212,23 +212,17 @@ class MotionEstimator:
         needs_none = self.is_fully_measured or (self.has_converged and was is None)
         if needs_none or doppler.taken_boot_us <= newest_us or self._is_of_before(doppler):
             return
-        now_us, summed = self._time_boot_us, self._summed_m_s
         # It begins with what was expected: reports may be wrong in a way that no model has.
-        expected = plus(self.start.velocity_ned_m_s, 1.0, summed)
-        known = was or MeasuredVelocity(now_us, summed, expected, self._expected_within_m_s**2, self.hit_boot_us)
-        known.predict(now_us, self._summed_m_s)
-        since_s = 1e-6 * (now_us - known.taken_boot_us)
+        spreads = reflex.PLACE_SPREAD_M, self._expected_within_m_s
+        start = self.start.position_ned_m, self.start.velocity_ned_m_s
+        known = was or MeasuredMotion(self.hit_boot_us, *start, spreads)
+        known.predict(self._time_boot_us, self._summed_m_s)
         was_odd, self._was_odd = self._was_odd, known.update(doppler, self._was_odd)
         if self._was_odd and not was_odd:
             return
         self._measured = known
-        if self._has_agreed:
-            return
-        place = self.motion.position_ned_m
-        if doppler.place_ned_m is not None:
-            off = limited(flat(minus(doppler.place_ned_m, place)), numbers.GATE * reflex.PLACE_SPREAD_M)
-            place = plus(place, since_s / (reflex.FOLLOWED_S + since_s), off)
-        self._believe(replace(self.motion, position_ned_m=place), self.spread_m_s)
+        if not self._has_agreed:
+            self._believe(self.motion, self.spread_m_s)
 
     def _is_of_before(self, doppler: Doppler) -> bool:
         """Whether a receiver shows what no vehicle does, and so is late: that it goes on into what it has hit."""
@@ -292,12 +286,12 @@ class MotionEstimator:
 
     def _believe(self, motion: MotionState, spread_m_s: float) -> None:
         """The motion by the reports; the horizontal velocity by a receiver, where there is one."""
-        velocity, self.spread_m_s = motion.velocity_ned_m_s, spread_m_s
+        self.motion, self.spread_m_s = motion, spread_m_s
         if self._measured is not None and self.is_measured_apart:
             self._measured.predict(self._time_boot_us, self._summed_m_s)
-            n, e, _ = self._measured.velocity_ned_m_s
-            velocity, self.spread_m_s = (n, e, velocity[2]), math.sqrt(self._measured.variance_m2_s2)
-        self.motion = MotionState(motion.position_ned_m, velocity)
+            (x, y), (u, v), _ = self._measured.state.tolist()
+            (*_, z), (*_, w) = motion.position_ned_m, motion.velocity_ned_m_s
+            self.motion, self.spread_m_s = MotionState((x, y, z), (u, v, w)), math.sqrt(self._measured.covariance[1, 1])
         self._look_back()
 
     def _look_back(self) -> None:

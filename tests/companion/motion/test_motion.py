@@ -233,6 +233,19 @@ def test_reports_that_look_as_expected_do_not_keep_the_belief_from_the_receivers
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.25)
 
 
+def test_what_a_receiver_shows_of_the_velocity_is_shown_of_the_way_since_the_hit_too():
+    # Given a vehicle that leaves at 3 m/s, not at the expected 1.35, and an estimate that flies on at 3 m/s
+    air, found = clipped(rebound_m_s=-3.0)
+    for _ in range(75):
+        air.reported_off_m += 0.004 * air.reported_off_m_s
+        go_on(air, found, 0.004)
+    # When a receiver has shown it
+    assert found.is_measured_apart
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-3.0, abs=0.25)
+    # Then the place is not half a metre off by what was expected until then
+    assert found.motion.position_ned_m[0] == pytest.approx(4.0 - 0.9, abs=0.1)
+
+
 def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estimate_agrees():
     # Given a tilt that is wrong after a hit, and makes an acceleration that no accelerometer shows
     air, found = clipped()
