@@ -90,6 +90,8 @@ class Reflex:
         if held is not None:
             found = [held]
             notices.append(_held_notice(held))
+            # It is the latest impact for whoever tells of them.
+            self.monitor.estimator.estimate, self.monitor.estimator.contact = held, None
         if not impacts and not notices:
             return NOTHING_SHOWN
         return Reaction(found, any(each.impact.is_ground for each in impacts), notices)

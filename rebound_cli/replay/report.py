@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.reflex.detection.detector import ImpactKind
+from companion.reflex.detection.detector import Evidence, ImpactKind
+from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.surface import Normal
 from rebound_cli.logs.log import WANTED, Log, clipping_text
 from rebound_cli.replay.recording import Recording, reproduce
@@ -109,6 +110,8 @@ def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
 def _seen_by(replay: Replay, finding: Finding) -> str:
     """The innovation that was largest beside its limit, as the detector published it; where it did not, the force."""
     impact = finding.first.impact
+    if impact.evidence is Evidence.SUSTAINED:
+        return lasting_text(finding.first)
     tested, _ = replay.findings.listener.shown.get(impact.sample_time_boot_us, (None, False))
     if tested is None or math.isnan(tested.ratio):
         return f"{impact.size_m_s2:.1f} m/s², a hit from {finding.threshold_m_s2:.1f} on"
@@ -116,6 +119,11 @@ def _seen_by(replay: Replay, finding: Finding) -> str:
     name, unit, digits = SIGNS[sign]
     value, limit = tested.signs[sign]
     return f"{name.lower()}: {value:.{digits}f} {unit}, a hit from {limit:.{digits}f} on"
+
+
+def lasting_text(estimate: ImpactEstimate) -> str:
+    """Of what no detector has shown."""
+    return f"a force that lasts: {estimate.impact.size_m_s2:.1f} m/s² for {estimate.time_error_us * 1e-6:.1f} s"
 
 
 def impact_facts(finding: Finding, normal: Normal, seconds: Callable[[float], float]) -> list[tuple[str, str]]:

@@ -12,10 +12,10 @@ import numpy as np
 
 from companion.messages import Vector3
 from companion.motion.config import SHOWN_US
-from companion.reflex.detection.detector import ImpactKind, Phase
+from companion.reflex.detection.detector import Evidence, ImpactKind, Phase
 from companion.reflex.surface import Normal
 from rebound_cli.replay.listening import PHASES, Tested
-from rebound_cli.replay.report import SIGNS, bearing, impact_facts, kind_text, speed_text
+from rebound_cli.replay.report import SIGNS, bearing, impact_facts, kind_text, lasting_text, speed_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import impact_text
@@ -103,6 +103,8 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     tested, may_be_hand = flight.findings.listener.shown.get(impact.sample_time_boot_us, (None, False))
     if tested is not None:
         yield from _signs(tested)
+    if impact.evidence is Evidence.SUSTAINED:
+        yield f"What the thrust should do and does not: {lasting_text(finding.first)}."
     if situation.descent_commanded:
         height = "an unknown height" if situation.height_m is None else f"{situation.height_m:.2f} m"
         yield f"A landing: thinkable, the vehicle was told to go down, at {height}."

@@ -45,6 +45,7 @@ class Evidence(Enum):
     FORCE = "force"  # a sample's averaging window held the contact's own force
     VELOCITY_JUMP = "aftermath"  # the contact fell between the samples; what followed it showed
     RATE_JUMP = "turn"  # the vehicle turned at once, and turns on as fast; its force may follow
+    SUSTAINED = "hold"  # no detector showed it: a force that lasted, or that tipped the vehicle
 
 
 class Situation(NamedTuple):

@@ -25,7 +25,7 @@ from companion.motion.strapdown import Strapdown
 from companion.motion.vector import ZERO, along, flat, minus, plus, split, towards, unit
 from companion.reflex import config as reflex
 from companion.reflex.detection.classify import hovers
-from companion.reflex.detection.detector import Impact, ImpactKind
+from companion.reflex.detection.detector import Evidence, Impact, ImpactKind
 from companion.reflex.detection.free_flight import ThrustGain
 from companion.reflex.detection.impact import ImpactEstimate
 from companion.reflex.surface import Normal, away_from
@@ -98,7 +98,7 @@ class SustainedForceMonitor:
         normal = away_from(plus(ZERO, -1.0, thrust))
         force = ned_to_body(attitude_wxyz, plus(ZERO, force_m_s2, normal))
         return ImpactEstimate(
-            impact=Impact(now_us, since_us, force, ImpactKind.STRUCK),
+            impact=Impact(now_us, since_us, force, ImpactKind.STRUCK, Evidence.SUSTAINED),
             time_boot_us=now_us,
             time_error_us=now_us - since_us,
             position_ned_m=sample.position_ned_m,
@@ -107,6 +107,8 @@ class SustainedForceMonitor:
             peak_specific_force_m_s2=force_m_s2,
             impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
             is_fully_measured=True,
+            is_lower_bound=False,
+            is_final=True,
         )
 
     def _held(self, sample: LocalPosition, goal_ned_m: Vector3 | None, elapsed_s: float) -> Vector3 | None:

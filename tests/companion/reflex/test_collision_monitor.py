@@ -111,6 +111,13 @@ def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reaso
     assert watch.texts("link")[-1] == "the detector sees again"
 
 
+def test_a_vehicle_that_hides_only_the_slowest_hits_by_shaking_is_watched():
+    # Given vibration that leaves a hit at 1 m/s, which begins with 30 m/s^2, visible
+    watch = Watch(BaselineConfig(detector="lateral")).fly(4_000_000, lambda t: (6.0 * math.sin(t), 0.0, 0.0))
+    assert 20.0 < watch.monitor.state.threshold_m_s2 < 30.0
+    assert watch.monitor.no_data_reason is None
+
+
 def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
     # Given a level vehicle that flies north; no attitude comes from 4 s on, and at 4.4 s it leans to gain 1.8 m/s
     from_us, until_us, speeding_up_m_s2 = 4_400_000, 5_000_000, 3.0

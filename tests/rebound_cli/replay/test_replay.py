@@ -47,6 +47,24 @@ def test_a_lockstep_flight_is_decided_again_to_the_bit(wall_folder, tmp_path, ca
     assert code == 1 and "expected no collisions, found 1" in text
 
 
+def test_what_only_holds_a_vehicle_is_a_collision_of_the_replay_too(tmp_path, capsys):
+    # Given a vehicle that leans on a wall which it met at 0.06 m/s
+    crawl = {"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}
+    wall = {"name": "wall", "point_ned_m": [0.4, 0, -1.5], "normal_ned": [-1, 0, 0], "width_m": 6, "height_m": 6}
+    mission = {
+        "name": "crawl",
+        "items": [{"takeoff": {"height_m": 1.5}}, crawl, {"land": {}}],
+        "sim": {"walls": [wall]},
+    }
+    mission |= {"on_collision": {"then": "land"}, "fence": {"radius_m": 10, "max_height_m": 6}}
+    file, folder = tmp_path / "crawl.yaml", tmp_path / "crawl"
+    file.write_text(yaml.safe_dump(mission))
+    assert said(capsys, "fly", file, "--lockstep", "--out", folder)[0] == 0
+    code, text, _ = said(capsys, "replay", folder, "--expect", "1", "--out", tmp_path / "replay")
+    assert code == 0 and "identical" in text
+    assert "HIT: struck while hovering, seen by a force that lasts: 2.0 m/s² for 0." in text
+
+
 def test_a_folder_of_an_earlier_version_is_decided_again(copied):
     # Given one without the versions that flew it, whose mission has the settings of a detector that drones had once
     (copied / "versions.json").unlink()
