@@ -60,12 +60,13 @@ class Reflex:
     keeps_trim: bool = False  # see interface.Autopilot
     sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     crash: CrashWatch = field(default_factory=CrashWatch)
+    held: ImpactEstimate | None = None  # the latest impact that no detector has shown
 
     def __post_init__(self) -> None:
         self._start(0)
 
     def _start(self, now_us: int) -> None:
-        self.monitor = start_monitor(self.config, now_us)
+        self.monitor, self.held = start_monitor(self.config, now_us), None
         self.monitor.estimator.recovery = self.law_config
 
     # --- what was touched
@@ -90,8 +91,7 @@ class Reflex:
         if held is not None:
             found = [held]
             notices.append(_held_notice(held))
-            # It is the latest impact for whoever tells of them.
-            self.monitor.estimator.estimate, self.monitor.estimator.contact = held, None
+            self.held = held
         if not impacts and not notices:
             return NOTHING_SHOWN
         return Reaction(found, any(each.impact.is_ground for each in impacts), notices)
@@ -232,6 +232,12 @@ class Reflex:
         return None if self._is_attitude_heard else "no attitude is heard"
 
     # --- what is known
+
+    @property
+    def latest(self) -> ImpactEstimate | None:
+        """The latest impact, by a detector or by what holds the vehicle."""
+        known = filter(None, (self.monitor.estimator.estimate, self.held))
+        return max(known, key=lambda each: each.impact.sample_time_boot_us, default=None)
 
     def in_one_recovery(self) -> list[Collision]:
         """The last hits, the newest first, without a recovery in between."""

@@ -142,7 +142,8 @@ def reproduce(recording: Recording) -> tuple[Findings, str | None]:
         if monitor is not watch:
             findings.listener.listen(monitor)
         watch = monitor
-        findings.note(monitor, known, stepped.core.flight.vehicle.is_airborne, step.time_us)
+        is_flying = stepped.core.flight.vehicle.is_airborne
+        findings.note(monitor, stepped.core.reflex.latest, known, is_flying, step.time_us)
         findings.happenings += ((event.time_us, event.text) for event in result.events)
         differences += _differences(recording.event_lines, step, result, told)
         for record in step.told:

@@ -143,9 +143,16 @@ class Findings:
         """Touches that are no collisions: landings, hands."""
         return [finding for finding in self.impacts if not finding.is_collision]
 
-    def note(self, monitor: CollisionMonitor, situation: Situation, is_flying: bool, at_us: int) -> None:
+    def note(
+        self,
+        monitor: CollisionMonitor,
+        estimate: ImpactEstimate | None,
+        situation: Situation,
+        is_flying: bool,
+        at_us: int,
+    ) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
-        estimate, off = monitor.estimator.estimate, situation.off_reason
+        off = situation.off_reason
         if estimate is not None and estimate.impact is not self._latest:
             self._latest = estimate.impact
             if not situation.is_wreck:
@@ -193,7 +200,8 @@ def watch_log(log: Log, config: CompanionConfig, modes: Sequence[str] | None = N
         impacts, notices = advance(monitor, samples, situation, now_us)
         for notice in notices:
             findings.happenings.append((now_us, notice.text))
-        findings.note(monitor, situation, circumstances.guard.vehicle.is_airborne, now_us)
+        is_flying = circumstances.guard.vehicle.is_airborne
+        findings.note(monitor, monitor.estimator.estimate, situation, is_flying, now_us)
         circumstances.note(impacts)
 
     for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):

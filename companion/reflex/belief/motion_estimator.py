@@ -285,7 +285,7 @@ class MotionEstimator:
         return SAME_M_S + math.hypot(*self.velocity_error_m_s) + reflex.SURE * self._swings_m_s
 
     def _believe(self, motion: MotionState, spread_m_s: float) -> None:
-        """The motion by the reports; the horizontal velocity by a receiver, where there is one."""
+        """The motion by the reports; horizontally by a receiver, where there is one."""
         self.motion, self.spread_m_s = motion, spread_m_s
         if self._measured is not None and self.is_measured_apart:
             self._measured.predict(self._time_boot_us, self._summed_m_s)

@@ -108,7 +108,6 @@ class SustainedForceMonitor:
             impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
             is_fully_measured=True,
             is_lower_bound=False,
-            is_final=True,
         )
 
     def _held(self, sample: LocalPosition, goal_ned_m: Vector3 | None, elapsed_s: float) -> Vector3 | None:

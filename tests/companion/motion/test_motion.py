@@ -246,6 +246,18 @@ def test_what_a_receiver_shows_of_the_velocity_is_shown_of_the_way_since_the_hit
     assert found.motion.position_ned_m[0] == pytest.approx(4.0 - 0.9, abs=0.1)
 
 
+def test_how_good_a_receivers_place_is_is_learnt_from_half_a_metre_on():
+    # Given one whose places are 7 cm off to the north, which is 5 cm on an axis
+    air = Air(0.112)
+    air.place_noise_m, known_m = 0.05 * math.sqrt(2.0), []
+    for _ in range(2_500):
+        air.step()
+        known_m.append(math.sqrt(air.doppler.place_variance_m2))
+    # Then it counts as PX4's default at first, half as good after two, and as it is in the end
+    assert known_m[0] == 0.5 and 0.2 < known_m[100] < 0.36
+    assert known_m[-1] == pytest.approx(0.05, rel=0.4)
+
+
 def test_what_a_receiver_shows_of_the_tilt_is_learnt_on_when_the_vehicles_estimate_agrees():
     # Given a tilt that is wrong after a hit, and makes an acceleration that no accelerometer shows
     air, found = clipped()
